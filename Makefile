@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 WORKERS ?= 2
-VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal thermometers dwells imports misfit access document acceptance
+VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access absence document acceptance wires_campaign
 FOREIGN := basil edie instro ixcom moto visa
 LONG_BENCHMARKS := $(addprefix tests.benchmarks.,growth lists analysis_workers)
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
@@ -44,11 +44,11 @@ screenshots: $(VENV)/.browser  ## take the pictures of the pages in docs/picture
 figures: $(VENV)/.browser  ## measure the pages in Chromium: stop, first paint, live charts over MINUTES (20), the feed
 	@$(BIN)/python -m tests.browser.figures --minutes $(or $(MINUTES),20)
 
-chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
-	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
+chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way; WIRES=1: faults and kills on a bench of drivers instead
+	@$(if $(WIRES),$(BIN)/python -m tests.soak.wires --minutes $(or $(MINUTES),15) --kill-s 90 || exit 1; exec $(BIN)/python -m tests.chaos.kills_over_wires; )kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
 
-soak: $(VENV)/.ready  ## mixed load for MINUTES (60): memory, descriptors, threads and logs must stay level
-	@$(BIN)/python -m tests.soak --minutes $(or $(MINUTES),60)
+soak: $(VENV)/.ready  ## mixed load for MINUTES (60): memory, descriptors, threads and logs must stay level; WIRES=1: drivers at served simulators, with a fault a minute
+	@$(BIN)/python -m tests.soak$(if $(WIRES),.wires) --minutes $(or $(MINUTES),60)
 
 format: $(VENV)/.ready  ## format the code, put imports in order, mend what ruff can mend safely
 	@$(BIN)/ruff check --fix-only --quiet . ; $(BIN)/ruff format --quiet .

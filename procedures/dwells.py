@@ -1,5 +1,7 @@
 """Parameters of a stop rule for dwells, shared by procedures that take means at stations."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Self
 
 from pydantic import Field, model_validator
@@ -7,7 +9,7 @@ from pydantic import Field, model_validator
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, expected_s, mean_sd
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.recording import TRIADS
+from procedures.core.recording import TRIADS, Station
 from procedures.core.report import Table
 from procedures.core.stop_rule import ChannelTarget, StopRule
 from procedures.core.unit import Unit
@@ -75,6 +77,38 @@ class StopAt(Parameters):
             "or give a longer dwell_s"
             for t in beyond
         )
+
+
+class DwellParameters(Parameters):
+    """Base of the parameters of procedures that dwell at rest: an optional rule that ends each dwell."""
+
+    stop_at: StopAt | None = Field(
+        None, description="end each dwell once the uncertainty of its means is this small; dwell_s is the longest"
+    )
+
+    def with_rule(self, unit: Unit) -> Self:
+        """The parameters with the rule by the unit's own noise. Raises `BadParameter` where that is not known."""
+        return self if self.stop_at is None else self.model_copy(update={"stop_at": self.stop_at.resolved(unit)})
+
+    @property
+    def until(self) -> StopRule | None:
+        """Rule of every station; None: dwells last their time."""
+        return None if self.stop_at is None else self.stop_at.rule
+
+    def dwell_warnings(self, stations: Sequence[Station]) -> tuple[str, ...]:
+        """Targets that the longest dwell of a schedule does not reach by the unit's noise."""
+        longest_s = max((s.record_s for s in stations), default=0.0)
+        return () if self.stop_at is None else self.stop_at.warnings(longest_s)
+
+
+def expected_stations(stations: Sequence[Station]) -> tuple[Station, ...]:
+    """The stations with the dwells that their rules are expected to make of them, for plans."""
+    return tuple(s if s.until is None else replace(s, record_s=expected_s(s.until, s.record_s)) for s in stations)
+
+
+def saved_tables(saved: DwellsSaved | None) -> tuple[Table, ...]:
+    """The table of `saved_table`, or none where dwells lasted their time."""
+    return () if saved is None else (saved_table(saved),)
 
 
 def saved_table(saved: DwellsSaved) -> Table:

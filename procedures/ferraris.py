@@ -68,6 +68,7 @@ def report(result: Result) -> Report:
     tables = (
         pictures.coefficient_table("Coefficients of the gyro triad", result.gyro.coefficients, note),
         pictures.triad_table(force),
+        *pictures.budget_tables("gyro", result.gyro.budgets),
         pictures.budget_table("accelerometer", force.budgets),
         of_turns.rate_table(result.gyro),
     )

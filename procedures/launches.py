@@ -64,7 +64,7 @@ class NoiseParameters(JudgedParameters):
     full_rate: bool = Field(True, description="also use what is faster than a cell, where the noise model describes it")
     trim: Part = Field("gyros", description="leave out the warm-up that is found at the start of a launch")
     trim_s: float | None = Field(
-        None, ge=0.0, le=1e7, description="instead of what is found: leave out so long since the launch"
+        None, ge=0.0, le=1e7, description="instead of what is found: leave out this time since the launch"
     )
     self_heating: Part = Field("accelerometers", description="fit two exponentials and subtract them (thesis 3.1.3)")
     wavelet: Literal["thesis", "rescaled", "none"] = Field(

@@ -18,19 +18,17 @@ from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.calibration.reference_temperature import (
-    AtReference,
     ThermalShare,
-    bring_to_reference,
-    gyros_at_reference,
     thermal_share,
     thermal_warnings,
 )
 from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
-from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise_of_means, suspected
+from procedures.analysis.calibration.triad_analysis import analyse_inputs, brought_by_unit, noise_of_means, suspected
 from procedures.analysis.orientation_plan.requirements import IN_RUN_SOURCE
 from procedures.analysis.own_axes import OWN_AXES, own_axis_check
+from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName
@@ -41,6 +39,7 @@ from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
+from procedures.dwells import saved_tables
 from procedures.procedure import JudgedParameters, Outcome, PredictedUncertainty
 from procedures.reports import calibration as pictures
 
@@ -59,8 +58,8 @@ class FitParameters(JudgedParameters):
     terms: tuple[Kind, ...] = Field(
         (),
         max_length=3,
-        description="beside b and K: quadratic K2·v² and asymmetry KA·|v| of the accelerometers, g_sensitivity of the "
-        "gyros; each must be determined by the positions",
+        description="in addition to b and K: quadratic K2·v² and asymmetry KA·|v| of the accelerometers, "
+        "g_sensitivity of the gyros; each must be determined by the positions",
     )
     scalar_check: bool = Field(False, description="cross-check of the accelerometers with the magnitude alone")
     residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
@@ -104,9 +103,8 @@ class Result(Outcome):
 
     triads: tuple[TriadSummary, ...]
     extended: tuple[Extended, ...] = ()
-    thermal: ThermalShare | None = Field(
-        None, exclude_if=lambda share: share is None, description="of the accelerometers, where they were corrected"
-    )
+    thermal: ThermalShare | None = Field(None, exclude_if=lambda share: share is None, description="where corrected")
+    dwells: DwellsSaved | None = Field(None, exclude_if=lambda saved: saved is None, description="of a stop rule")
 
 
 def inputs_at(
@@ -153,18 +151,19 @@ def calibrated(
     `lag_s`, time constants of case and converter sensor: both triads are first brought to the references of the unit's
     corrections; None: they are taken as they are.
     """
-    share, doubts = None, ()
+    share: ThermalShare | None = None
+    doubts: tuple[str, ...] = ()
     fitted: list[tuple[TriadSummary, TriadFit]] = []
     extended: list[Extended] = []
     for triad, given in inputs.items():
         require_determined(params, triad, given)
-        means, record, more = station_means(recordings, triad), unit.triad(triad) if unit else None, None
-        warm = None
+        means, record = station_means(recordings, triad), unit.triad(triad) if unit else None
+        more, warm = None, None
         if unit is not None and lag_s is not None:
-            means, more, warm = _brought(recordings, means, unit, lag_s)
+            means, more, warm = brought_by_unit(recordings, means, unit, lag_s)
         scalar = params.scalar_check and triad == "accelerometer"
-        fixed = (given.vectors, given.errors, given.magnitude, record, scalar, params.weighting, more)
-        found = analyse_inputs(means, *fixed)
+        of_inputs = (given.vectors, given.errors, given.magnitude, record)
+        found = analyse_inputs(means, *of_inputs, scalar, params.weighting, more)
         if warm is not None and unit is not None and unit.thermal_correction is not None:
             share = thermal_share(warm, unit.thermal_correction, found[1])
             doubts = thermal_warnings(warm, unit.thermal_correction)
@@ -173,10 +172,8 @@ def calibrated(
             noise, known = noise_of_means(means, record)
             noise = noise + sum((more or {}).values())
             terms = terms_of(kinds, given.vectors, given.forces)
-            units = means.output_unit, INPUT_UNITS[triad]
-            whole = fit_terms(
-                f"the {triad} coefficients", given.vectors, means.outputs, noise, given.errors, terms, units, known
-            )
+            what, units = f"the {triad} coefficients", (means.output_unit, INPUT_UNITS[triad])
+            whole = fit_terms(what, given.vectors, means.outputs, noise, given.errors, terms, units, known)
             extended.append(_extended(triad, means, whole))
     summaries = suspected(fitted)
     checks = tuple(c for t in summaries for c in _checks(t, _of(extended, t), params))
@@ -187,20 +184,8 @@ def calibrated(
         triads=summaries,
         extended=tuple(extended),
         thermal=share,
+        dwells=dwells_saved(recordings),
     )
-
-
-def _brought(
-    recordings: Sequence[Recording], means: StationMeans, unit: Unit, lag_s: tuple[float, float]
-) -> tuple[StationMeans, dict[str, Array], AtReference | None]:
-    """Station means at the references of the unit's corrections, and their covariances from these, by cause."""
-    if means.triad == "accelerometer" and unit.thermal_correction is not None:
-        warm = bring_to_reference(recordings, means, unit.thermal_correction, lag_s)
-        return warm.means, {"thermal correction": warm.of_correction, "thermometers": warm.of_sensors}, warm
-    if means.triad == "gyro" and unit.gyro_correction is not None:
-        own, covariance = gyros_at_reference(recordings, means, unit.gyro_correction)
-        return own, {"thermal correction": covariance}, None
-    return means, {}, None
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
@@ -224,7 +209,9 @@ def report(result: Result) -> Report:
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the positions")]
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
-    return Report(sections=(*tables, *figures, *(pictures.station_table(m) for m in magnitudes)))
+    return Report(
+        sections=(*tables, *saved_tables(result.dwells), *figures, *(pictures.station_table(m) for m in magnitudes))
+    )
 
 
 def _extended(triad: str, means: StationMeans, fit: ExtraFit) -> Extended:
@@ -296,6 +283,6 @@ def _term_table(extended: Extended) -> Table:
     )
     columns = ("term", "unit", "estimate", "± standard uncertainty", "p without it", "present")
     c = extended.calibration
-    bias = ", ".join(f"{b:.6g}" for b in c.bias_array)
-    note = f"Fitted with b and K at once, which then are other than without the terms: b = ({bias}) {c.output_unit}."
+    bias = f"({', '.join(f'{b:.6g}' for b in c.bias_array)}) {c.output_unit}"
+    note = f"Fitted with b and K at once, which then are other than without the terms: b = {bias}."
     return Table(f"Further terms of the {c.triad} triad", columns, rows, note)

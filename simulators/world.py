@@ -206,8 +206,8 @@ def _resume(bench: SimulatedBench, checkpoint: Mapping[str, Any]) -> None:
     if version != CHECKPOINT_VERSION:
         raise OtherVersion(
             f"the simulated bench's state was stored by version {version} of the simulators, and these are version "
-            f"{CHECKPOINT_VERSION}: a job cannot go on from it. Submit it again with the same seed, or resume it under "
-            "the service that began it"
+            f"{CHECKPOINT_VERSION}: a job cannot continue from it. Submit it again with the same seed, or resume it "
+            "under the service that began it"
         )
     warm = checkpoint.get("chamber") is not None
     sourced = checkpoint.get("current_source") is not None

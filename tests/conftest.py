@@ -5,6 +5,7 @@ import os
 import shutil
 import socket
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from uuid import uuid4
@@ -159,15 +160,24 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def new_postgres_database(postgres_server: str) -> Callable[[], str]:
-    """Makes empty databases that live as long as the server: for fixtures that serve a whole module."""
+def served_postgres_template(postgres_server: str, postgres_template: str) -> str:
+    """Name of a Postgres database with the tables of the service and its job engine, to be copied for a service."""
+    name = _create(postgres_server, f"template_{uuid4().hex}", f"TEMPLATE {postgres_template}")
+    command = [str(Path(sys.executable).with_name("dbos")), "migrate", "--sys-db-url", _named(postgres_server, name)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=110, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return name
+
+
+@pytest.fixture(scope="session")
+def new_postgres_database(postgres_server: str, served_postgres_template: str) -> Callable[[], str]:
+    """Makes databases that a service has run on and that live as long as the server: for whole modules' fixtures."""
 
     def make() -> str:
-        name = f"test_{uuid4().hex}"
-        admin = sa.create_engine(postgres_server, isolation_level="AUTOCOMMIT", poolclass=sa.NullPool)
-        with admin.connect() as connection:
-            connection.execute(sa.text(f"CREATE DATABASE {name}"))
-        return sa.make_url(postgres_server).set(database=name).render_as_string(hide_password=False)
+        return _named(
+            postgres_server,
+            _create(postgres_server, f"test_{uuid4().hex}", f"TEMPLATE {served_postgres_template}"),
+        )
 
     return make
 

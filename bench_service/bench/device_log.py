@@ -58,7 +58,8 @@ class DeviceLog:
 
     def __init__(self, bench: Bench, station: Station) -> None:
         """Set up. Angles are read of a table that stands still and carries the unit: not where a hand sets it."""
-        alone = station.turn is None and station.profile is None and station.current_ma is None
+        moved = station.turn is not None or station.sinusoid is not None
+        alone = not moved and station.profile is None and station.current_ma is None
         self._commanded = station.angles if alone else None
         self._bench = bench
         self._read_s = -inf

@@ -162,7 +162,7 @@ class Campaign(Document):
     steps: tuple[Step, ...] = Field(min_length=1, max_length=100)
     max_errors: int | None = Field(None, ge=1, le=100, description="stop once so many steps ended in error")
     window_h: float | None = Field(
-        None, gt=0.0, le=8760.0, description="stop so long after the start; a plan that takes longer is refused"
+        None, gt=0.0, le=8760.0, description="stop this long after the start; a plan that takes longer is refused"
     )
     labels: Labels = Field(default_factory=Labels, max_length=20)
     decision: DecisionRule = Field(default_factory=lambda: DecisionRule.model_validate({}))

@@ -60,7 +60,7 @@ class FaultPlan(BaseModel):
             where = ".".join(map(str, first["loc"]))
             raise Misconfigured(f"BENCH_DEVICE_FAULTS: {where} = {first['input']!r}: {first['msg']}") from error
         except ValueError as error:
-            raise Misconfigured(f"BENCH_DEVICE_FAULTS is no JSON: {error}") from error
+            raise Misconfigured(f"BENCH_DEVICE_FAULTS is not JSON: {error}") from error
 
 
 class DeviceFaults:

@@ -95,7 +95,7 @@ def _agree_on_frames(file: BenchFile, bench: ServedBench) -> None:
         path.write_text(frames.description(), encoding="utf-8")
     elif tomllib.loads(path.read_text(encoding="utf-8")) != tomllib.loads(frames.description()):
         raise Misconfigured(
-            f"{path} describes other frames than the simulated unit sends: delete it, and it is written anew"
+            f"{path} describes other frames than the simulated unit sends: delete it, and it is written again"
         )
 
 

@@ -57,7 +57,7 @@ class SpreadProcesses:
         self._closed = False
 
     def over(self, values: int) -> Spread | None:
-        """These processes for an analysis of so many values, None where it is not worth it."""
+        """Return these processes for an analysis of that many values, None for one too small to be shared."""
         return self if values >= MANY_VALUES and not self._closed else None
 
     def used_for(self, recordings: Sequence[Recording]) -> AbstractContextManager[None]:

@@ -21,6 +21,8 @@ BYTES_PER_SAMPLE = 2
 
 TEMPERATURE_CHANNELS = 7
 """Five sensors of the unit and two readings of the chamber, added to the triads where a station wants temperatures."""
+ENCODER_CHANNELS = 5
+"""Readings of the table, added where a station follows a sinusoid."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,11 @@ def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:
             return found
     if station.current_ma is not None:
         return bench.current_violations(station.current_ma, station.profile)
-    return () if station.angles is None else bench.violations(station.angles, station.turn, station.profile)
+    if station.angles is None:
+        return ()
+    if station.sinusoid is not None:
+        return bench.sinusoid_violations(station.angles, station.sinusoid)
+    return bench.violations(station.angles, station.turn, station.profile)
 
 
 def _samples(station: Station, unit: Unit) -> int:
@@ -157,4 +163,5 @@ def _samples(station: Station, unit: Unit) -> int:
         return round(station.record_s * (station.sample_rate_hz or unit.sample_rate_hz)) * 4
     seconds = station.record_s if station.profile is None else station.profile.expected_s()
     channels = len(unit.channels) + TEMPERATURE_CHANNELS * station.temperatures
+    channels += ENCODER_CHANNELS * (station.sinusoid is not None)
     return round(seconds * (station.sample_rate_hz or unit.sample_rate_hz)) * channels

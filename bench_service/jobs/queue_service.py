@@ -102,7 +102,7 @@ class QueueService:
         try:
             found = self._stores.reservations.get(reservation_id)
         except NotFound:
-            raise BadParameter("reservation", reservation_id, "the id of a reservation that holds now") from None
+            raise BadParameter("reservation", reservation_id, "the id of a reservation that is active now") from None
         if not found.active(now()):
             ended = f"one that holds now: this one ended at {found.over_at.isoformat()}"
             raise BadParameter("reservation", reservation_id, ended)

@@ -56,4 +56,4 @@ class StopEntry:
             word.id, now(), word.by, "stop", f"bench {stop.bench}", "noted", {"text": text, "late_s": late_s, **detail}
         )
         if self._trail.add_once(entry) and late_s > LATE_S:
-            log.warning("a stop of bench %s is entered %.1f s after it was asked for", stop.bench, late_s)
+            log.warning("a stop of bench %s is stored %.1f s after it was requested", stop.bench, late_s)

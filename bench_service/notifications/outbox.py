@@ -112,7 +112,7 @@ class Outbox:
             deliver(self.target, message, self._pages)
         except Undelivered as error:
             if error.final or at - message.at > OLDEST:
-                log.error("given up: %s: %s", message.title, error)
+                log.error("not delivered, and not tried again: %s: %s", message.title, error)
                 return True
             log.warning("not delivered, tried again in %s: %s: %s", self._pause, message.title, error)
             self._due, self._pause = at + self._pause, min(2 * self._pause, LONGEST_PAUSE)

@@ -36,7 +36,7 @@ class Link:
     digest: str = ""
 
     def digest_after(self, before: str) -> str:
-        """The digest of this entry after one with the digest `before`."""
+        """Return the digest of this entry that follows an entry with the digest `before`."""
         at = self.at.astimezone(UTC).isoformat(timespec="microseconds")
         parts = [self.sequence, self.id, at, self.who, self.action, self.target, self.outcome, self.detail]
         return hashlib.sha256(f"{before}\n{json.dumps(parts)}".encode()).hexdigest()

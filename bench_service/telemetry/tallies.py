@@ -115,7 +115,7 @@ class Tallies:
             self._add_up_recordings()
 
     def ended(self) -> dict[JobState, int]:
-        """Number of jobs in each of the last states, as counted: to count them anew takes as long as the history is."""
+        """Number of jobs in each of the last states, as counted: counting again takes longer with the history."""
         found = Counter[str]()
         for (_, state, _), count in self.finished.items():
             found[state] += count

@@ -66,6 +66,10 @@ class BenchDescription:
     """Limits of the unit's supply; None: its voltage cannot be set, the supply only switches."""
     sinusoidal: bool = False
     """True where the table can follow a sinusoid (`Turntable.command_sinusoid`)."""
+    turn_extra_s: float = 0.0
+    """Time that whole turns take beyond `Turn.duration_s`, for the table's demands over a wire [s, bench time]."""
+    no_turns: str = ""
+    """The reason why no job with whole turns can run here; empty: one can, within the limits."""
     devices: tuple[DeclaredDevice, ...] = ()
     """Devices of a bench that has a bench file, with their identities and certificates; empty: all are simulated."""
     expired_certificates: Literal["refuse", "warn"] = "refuse"
@@ -168,6 +172,8 @@ class BenchDescription:
         return profile.violations(self.chamber.minimum_c, self.chamber.maximum_c, self.chamber.ramp_c_min)
 
     def _turn_violations(self, angles: TableAngles, turn: Turn) -> tuple[str, ...]:
+        if self.no_turns:
+            return (self.no_turns,)
         limits = self.axis(turn.axis)
         begin = {"outer": angles.outer_deg, "middle": angles.middle_deg, "inner": angles.inner_deg}[turn.axis]
         end = begin + turn.angle_deg

@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from procedures.bench.device import Device, Status
 from procedures.bench.errors import DeviceFault
 from procedures.core.constant_rate import ConstantRate
@@ -32,6 +35,23 @@ class TableReading:
     """Rates of outer, middle and inner axis [deg/s]; None where the controller reports none."""
 
 
+@dataclass(frozen=True)
+class EncoderTrace:
+    """Readings of the encoders during a sinusoid, in order of time."""
+
+    time_s: NDArray[np.float64]
+    """Bench time of each reading [s], (n,)."""
+    angles_deg: NDArray[np.float64]
+    """Angles of outer, middle and inner axis [deg], (n, 3)."""
+    within_s: NDArray[np.float64]
+    """Half the interval in which the reading was taken [s], (n,): its time is known to ± so much. 0: exactly."""
+
+
+NO_TRACE = EncoderTrace(np.empty(0), np.empty((0, 3)), np.empty(0))
+MOST_TRACED = 100_000
+"""Largest number of readings that a table keeps for `Turntable.trace`; older ones are dropped."""
+
+
 class Turntable(Device, Protocol):
     """Port of the turntable. `move_to` and `settle` return when all axes are at rest and locked, the other verbs as
     soon as the table has answered. No verb holds the bench's loop: each awaits the table's answer, with a deadline.
@@ -59,7 +79,15 @@ class Turntable(Device, Protocol):
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         """Begin whole cycles of one axis about its present angle, the others held; otherwise as `command_turn`.
 
-        Raises `OutOfRange` before anything moves, also where `BenchDescription.sinusoidal` is False.
+        The table may begin and end the cycles in its own way, and is led back to the angle where they began. Raises
+        `OutOfRange` before anything moves, also where `BenchDescription.sinusoidal` is False.
+        """
+        ...
+
+    def trace(self) -> EncoderTrace:
+        """Take the readings that the table has made since the last call; waits on no line.
+
+        They are made from the begin of a sinusoid to its end, as often as the table can; there are none otherwise.
         """
         ...
 
@@ -80,6 +108,15 @@ class Turntable(Device, Protocol):
         A table at rest gets no command. Raises `DeviceFault`, `Disconnected`.
         """
         ...
+
+
+def appended(kept: EncoderTrace, fresh: EncoderTrace) -> EncoderTrace:
+    """Readings after earlier ones, the newest `MOST_TRACED` of them."""
+    return EncoderTrace(
+        np.concatenate([kept.time_s, fresh.time_s])[-MOST_TRACED:],
+        np.concatenate([kept.angles_deg, fresh.angles_deg])[-MOST_TRACED:],
+        np.concatenate([kept.within_s, fresh.within_s])[-MOST_TRACED:],
+    )
 
 
 def require_turns_over(begin: TableAngles | None, turn: Turn, reading: TableReading) -> None:

@@ -44,7 +44,7 @@ from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 from procedures.core.limits import Check, Limit, PlannedCheck, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
-from procedures.dwells import StopAt, saved_table
+from procedures.dwells import DwellParameters, expected_stations, saved_tables
 from procedures.multi_position import predicted, triad_checks
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import calibration as pictures
@@ -75,7 +75,7 @@ class Limits(Parameters):
     )
 
 
-class Params(TableParameters):
+class Params(TableParameters, DwellParameters):
     """Orientations, dwell, site and limits of the calibration. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle], ...] = Field(
@@ -86,9 +86,6 @@ class Params(TableParameters):
     )
     dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
-    stop_at: StopAt | None = Field(
-        None, description="end each dwell once the uncertainty of its means is this small; dwell_s is the longest"
-    )
     weighting: Weighting = Field(
         "noise_and_table",
         description="noise_and_table: least squares that allows for the table's declared accuracy; noise: the table's "
@@ -122,7 +119,7 @@ def resolve(params: Params, context: Context) -> Params:
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
     full.require_sources(context, full.thermal_correction == "current")
-    return full if full.stop_at is None else full.model_copy(update={"stop_at": full.stop_at.resolved(context.unit)})
+    return full.with_rule(context.unit)
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -139,7 +136,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.settle_s,
             params.dwell_s,
             temperatures=params.thermal_correction == "current",
-            until=None if params.stop_at is None else params.stop_at.rule,
+            until=params.until,
         )
         for i, (beta, gamma) in enumerate(params.orientations)
     )
@@ -148,15 +145,13 @@ def schedule(params: Params) -> tuple[Station, ...]:
 def predict(params: Params, context: Context) -> Prediction:
     """Duration, the uncertainty of every coefficient, and the limits out of reach. Raises `Undetermined`."""
     params = resolve(params, context)
-    longest_s = params.dwell_s or 0.0
-    params = _as_expected(params)
     stations = schedule(params)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     uncertainties = tuple(u for plan in plans for u in predicted(plan))
     thermal = (_NOT_PREDICTED,) if params.thermal_correction == "current" else ()
-    thermal += () if params.stop_at is None else params.stop_at.warnings(longest_s)
-    duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
+    thermal += params.dwell_warnings(stations)
+    duration_s = float(windows(expected_stations(stations), context.bench.axis_motion)[-1, 1])
     rests_on = basis(plans) if uncertainties else ""
     return Prediction(duration_s, uncertainties, _warnings(params, plans) + thermal, rests_on)
 
@@ -209,7 +204,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
     """Checks of the error per axis δ/√3, in sample."""
-    params = _as_expected(resolve(params, context))
+    params = resolve(params, context)
     limits = params.limits
     maxima = {"gyro": limits.gyro_bias_in_run_deg_h, "accelerometer": limits.accelerometer_bias_in_run_m_s2}
     level = limits.residual_p_value_min
@@ -228,23 +223,13 @@ def report(result: Result) -> Report:
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
     stations = [pictures.station_table(m) for m in magnitudes]
     thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)
-    dwells = [] if result.dwells is None else [saved_table(result.dwells)]
-    return Report(sections=(*tables, *dwells, *thermal, *figures, *stations))
-
-
-def _as_expected(params: Params) -> Params:
-    """The parameters with the dwell that the stop rule is expected to make of it, for plans."""
-    if params.stop_at is None or params.dwell_s is None:
-        return params
-    return params.model_copy(update={"dwell_s": params.stop_at.expected_s(params.dwell_s)})
+    return Report(sections=(*tables, *saved_tables(result.dwells), *thermal, *figures, *stations))
 
 
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
-    site = params.site(context)
+    site, stations = params.site(context), expected_stations(schedule(params))
     uncertainty = params.table(site)
-    return triad_plan(
-        triad, context.unit, schedule(params), context.bench.axis_motion, site, uncertainty, params.weighting
-    )
+    return triad_plan(triad, context.unit, stations, context.bench.axis_motion, site, uncertainty, params.weighting)
 
 
 def _require_scalar(params: Params, accelerometer: TriadPlan) -> None:

@@ -16,7 +16,7 @@ from procedures.analysis.calibration.plan import triad_plan
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.own_axes import OWN_AXES
-from procedures.analysis.turns.ferraris import face_stations, ferraris_estimator, rests_and_turns
+from procedures.analysis.turns.ferraris import END_REST_S, face_stations, ferraris_estimator, rests_and_turns
 from procedures.analysis.turns.plan import coefficient_names
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -44,6 +44,9 @@ class Params(TableParameters):
     rate_deg_s: float = Field(30.0, ge=0.1, le=3600.0)
     ramp_s: float | None = Field(None, gt=0.0, le=600.0, description="None: what the outer axis' acceleration allows")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
+    end_rest_s: float | None = Field(
+        None, ge=1.0, le=600.0, description="after turns, recorded; None: 2 s, and what the table's demands take"
+    )
     limits: FerrarisLimits = Field(default_factory=lambda: FerrarisLimits.model_validate({}))
 
 
@@ -51,7 +54,8 @@ def resolve(params: Params, context: Context) -> Params:
     """Rest from the unit; ramps, site and table accuracy from the bench."""
     outer = context.bench.outer
     ramp_s = PEAK_ACCELERATION * params.rate_deg_s / (ACCELERATION_SHARE * outer.acceleration_deg_s2)
-    own = {"rest_s": context.unit.averaging_time_s, "ramp_s": ceil(10.0 * ramp_s) / 10.0}
+    end_rest_s = END_REST_S + ceil(10.0 * context.bench.turn_extra_s) / 10.0
+    own = {"rest_s": context.unit.averaging_time_s, "ramp_s": ceil(10.0 * ramp_s) / 10.0, "end_rest_s": end_rest_s}
     full = params.filled({**own, **declared_table(context)})
     full.require_sources(context, corrected=False)
     return full
@@ -59,10 +63,11 @@ def resolve(params: Params, context: Context) -> Params:
 
 def schedule(params: Params) -> tuple[Station, ...]:
     """Face after face: a rest, turns there, turns back. Raises `BadParameter` where a rate would not be reached."""
-    if params.rest_s is None or params.ramp_s is None:
-        raise BadParameter("rest_s", None, "resolve the parameters first: rest and ramp come from unit and bench")
+    if params.rest_s is None or params.ramp_s is None or params.end_rest_s is None:
+        raise BadParameter("rest_s", None, "resolve the parameters first: rests and ramp come from unit and bench")
+    turns = (params.turns, params.rate_deg_s, params.ramp_s, params.settle_s, params.end_rest_s)
     try:
-        return face_stations(params.rest_s, params.turns, params.rate_deg_s, params.ramp_s, params.settle_s)
+        return face_stations(params.rest_s, *turns)
     except ValueError as refusal:
         raise BadParameter("turns", params.turns, str(refusal)) from refusal
 
@@ -71,6 +76,9 @@ def predict(params: Params, context: Context) -> Prediction:
     """Duration and the uncertainty of each coefficient of both triads. Raises `BadParameter`, `Undetermined`."""
     params = resolve(params, context)
     stations = schedule(params)
+    if (params.end_rest_s or 0.0) < context.bench.turn_extra_s:
+        allowed = f"at least {context.bench.turn_extra_s:.3g} s, which the table's demands take"
+        raise BadParameter("end_rest_s", params.end_rest_s, allowed)
     for station in stations:
         if station.angles is not None and (found := context.bench.violations(station.angles, station.turn)):
             raise BadParameter("rate_deg_s", params.rate_deg_s, f"station {station.label}: {'; '.join(found)}")

@@ -19,6 +19,7 @@ from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
 from procedures.core.recording import Recording, Station
 from procedures.core.table_angles import TableAngles
+from procedures.dwells import DwellParameters, expected_stations
 from procedures.multi_position import FitParameters, Inputs, Result
 from procedures.procedure import Context, Prediction, Procedure
 from procedures.site_parameters import TableParameters, declared_table
@@ -28,11 +29,14 @@ FOURTEEN = tuple(position[:3] for position in THESIS_POSITIONS[1:-1])
 """The rests of the thesis's program (appendix Д) without the home position at its beginning and end."""
 
 
-class Params(FitParameters, TableParameters):
+class Params(FitParameters, TableParameters, DwellParameters):
     """Positions, dwell, site and fit; None takes the unit's or the bench's value, or the thesis's positions."""
 
     positions: tuple[tuple[Angle, Angle, Angle], ...] | None = Field(
-        None, min_length=1, max_length=500, description="(outer, middle, inner) [deg], in order; not beside `program`"
+        None,
+        min_length=1,
+        max_length=500,
+        description="(outer, middle, inner) [deg], in order; not together with `program`",
     )
     program: str | None = Field(
         None,
@@ -52,7 +56,7 @@ def resolve(params: Params, context: Context) -> Params:
     dwell = {} if params.program is not None else {"dwell_s": context.unit.averaging_time_s}
     full = params.filled({**own, **dwell, **declared_table(context)})
     full.require_sources(context, corrected=False)
-    return full
+    return full.with_rule(context.unit)
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -71,6 +75,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             None,
             params.settle_s,
             dwell_s,
+            until=params.until,
         )
         for i, (a, dwell_s) in enumerate(rests)
     )
@@ -85,8 +90,9 @@ def predict(params: Params, context: Context) -> Prediction:
     plans = [_plan(triad, params, context) for triad in params.triads]
     uncertainties = tuple(u for plan in plans for u in multi_position.predicted(plan))
     terms = ("the predicted uncertainties are without the further terms, which take some from b and K",)
-    duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
-    return Prediction(duration_s, uncertainties, terms if params.terms else (), basis(plans) if uncertainties else "")
+    duration_s = float(windows(expected_stations(stations), context.bench.axis_motion)[-1, 1])
+    warnings = (terms if params.terms else ()) + params.dwell_warnings(stations)
+    return Prediction(duration_s, uncertainties, warnings, basis(plans) if uncertainties else "")
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
@@ -108,16 +114,16 @@ def _inputs(params: Params, context: Context) -> dict[str, Inputs]:
 
 
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
-    site = params.site(context)
+    site, stations = params.site(context), expected_stations(schedule(params))
     return triad_plan(
-        triad, context.unit, schedule(params), context.bench.axis_motion, site, params.table(site), params.weighting
+        triad, context.unit, stations, context.bench.axis_motion, site, params.table(site), params.weighting
     )
 
 
 PROCEDURE = Procedure(
     "multi_position_calibration",
     "Calibration in any positions",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     resolve,

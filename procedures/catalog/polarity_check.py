@@ -24,6 +24,8 @@ from procedures.core.report import Report, Table
 from procedures.core.turn import PEAK_ACCELERATION, Turn
 from procedures.procedure import Context, JudgedParameters, Outcome, Parameters, Prediction, Procedure
 
+REST_S = 4.0
+"""Rest at the end of a recording where the table's demands take no time [s]."""
 ACCELERATION_SHARE = 0.5
 """Share of the outer axis' acceleration that the ramps use."""
 
@@ -41,7 +43,9 @@ class Params(JudgedParameters):
 
     rate_deg_s: float = Field(30.0, ge=1.0, le=360.0)
     ramp_s: float | None = Field(None, gt=0.0, le=60.0, description="None: half of the outer axis' acceleration")
-    rest_s: float = Field(4.0, ge=1.0, le=600.0, description="at rest at the end of each recording")
+    rest_s: float | None = Field(
+        None, ge=1.0, le=600.0, description="at the end of each recording; None: 4 s, and what the table's demands take"
+    )
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
@@ -54,14 +58,17 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Ramp from the outer axis' acceleration."""
+    """Ramp from the outer axis' acceleration, rest from the table's demands: the last half of it is at rest."""
     ramp_s = PEAK_ACCELERATION * params.rate_deg_s / (ACCELERATION_SHARE * context.bench.outer.acceleration_deg_s2)
-    return params.filled({"ramp_s": ceil(10.0 * ramp_s) / 10.0})
+    rest_s = REST_S + 2.0 * ceil(10.0 * context.bench.turn_extra_s) / 10.0
+    return params.filled({"ramp_s": ceil(10.0 * ramp_s) / 10.0, "rest_s": rest_s})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
     """Axis x, y, z upwards, one turn each. Raises `BadParameter` where the rate would not be reached."""
     turn = _turn(params)
+    if params.rest_s is None:
+        raise BadParameter("rest_s", None, "resolve the parameters first: the rest comes from the bench")
     return tuple(
         Station(i, f"{axis} up, one turn", angles, None, params.settle_s, turn.duration_s + params.rest_s, turn=turn)
         for i, (axis, angles) in enumerate(UPRIGHT.items())
@@ -72,6 +79,9 @@ def predict(params: Params, context: Context) -> Prediction:
     """Duration. Raises `BadParameter` where the table cannot turn so."""
     params = resolve(params, context)
     stations = schedule(params)
+    if (params.rest_s or 0.0) < 2.0 * context.bench.turn_extra_s:
+        allowed = f"at least {2.0 * context.bench.turn_extra_s:.3g} s, twice what the table's demands take"
+        raise BadParameter("rest_s", params.rest_s, allowed)
     for station in stations:
         if station.angles is not None and (found := context.bench.violations(station.angles, station.turn)):
             raise BadParameter("rate_deg_s", params.rate_deg_s, f"station {station.label}: {'; '.join(found)}")

@@ -41,10 +41,13 @@ from procedures.procedure import (
     Procedure,
 )
 from procedures.reports import whole_turns as pictures
+from procedures.reports.calibration import budget_tables
 from procedures.site_parameters import Arcsec
 
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
 
+REST_S = 2.0
+"""Rest at the end of a recording where the table's demands take no time [s]."""
 ACCELERATION_SHARE = 0.9
 """Share of the outer axis' acceleration for ramps without a given length; the rest is for the servo."""
 
@@ -66,7 +69,9 @@ class Params(JudgedParameters):
     )
     turning_s: float = Field(45.0, ge=1.0, le=86_400.0, description="at each rate, to the nearest whole turn")
     ramp_s: float | None = Field(None, gt=0.0, le=600.0, description="None: what the outer axis' acceleration allows")
-    rest_s: float = Field(2.0, ge=1.0, le=600.0, description="at rest at the end of each recording")
+    rest_s: float | None = Field(
+        None, ge=1.0, le=600.0, description="at the end of each recording; None: 2 s, and what the table's demands take"
+    )
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
     terms: tuple[Term, ...] = Field(TERMS, max_length=3, description="to fit beyond bias and matrix")
     reference_rate_deg_s: Rate | None = Field(
@@ -108,6 +113,7 @@ def resolve(params: Params, context: Context) -> Params:
     ramp_s = PEAK_ACCELERATION * fastest / (ACCELERATION_SHARE * outer.acceleration_deg_s2)
     defaults = {
         "ramp_s": ceil(10.0 * ramp_s) / 10.0,
+        "rest_s": REST_S + ceil(10.0 * context.bench.turn_extra_s) / 10.0,
         "reference_rate_deg_s": fastest,
         "latitude_deg": site.latitude_deg,
         "azimuth_deg": site.azimuth_deg,
@@ -187,23 +193,36 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 def report(result: Result) -> Report:
     """Coefficients, scale factor over the rates, checks."""
     found = result.gyro
-    return Report(sections=(pictures.turns_table(found), *pictures.rate_figures(found), pictures.rate_table(found)))
+    return Report(
+        sections=(
+            pictures.turns_table(found),
+            *pictures.rate_figures(found),
+            *budget_tables("gyro", found.budgets),
+            pictures.rate_table(found),
+        )
+    )
 
 
 def _program(params: Params) -> TurnProgram:
-    if params.ramp_s is None:
-        raise BadParameter("ramp_s", None, "resolve the parameters first: the ramps come from the bench")
+    if params.ramp_s is None or params.rest_s is None:
+        raise BadParameter("ramp_s", None, "resolve the parameters first: ramps and rests come from the bench")
     return TurnProgram(params.rates_deg_s, params.turning_s, params.ramp_s, params.rest_s, params.settle_s)
 
 
 def _plan(params: Params, context: Context) -> TurnPlan:
-    uncertainty = TableUncertainty(params.orthogonality_sd_arcsec or 0.0, params.pointing_sd_arcsec or 0.0)
+    site = _site(params, context)
+    uncertainty = TableUncertainty(
+        params.orthogonality_sd_arcsec or 0.0,
+        params.pointing_sd_arcsec or 0.0,
+        context.bench.accuracy.level_sd_arcsec,
+        site.azimuth_sd_arcsec,
+    )
     reference = params.reference_rate_deg_s or max(params.rates_deg_s)
     return TurnPlan(
         _program(params),
         context.unit,
         context.bench.axis_motion,
-        _site(params, context),
+        site,
         uncertainty,
         params.terms,
         reference * units.DEG,
@@ -216,7 +235,10 @@ def _site(params: Params, context: Context) -> Site:
 
 
 def _require_possible(params: Params, bench: BenchDescription) -> None:
-    """Refuse turns that the table cannot make, before anything moves."""
+    """Refuse turns that the table cannot make, or not within their recordings, before anything moves."""
+    if (params.rest_s or 0.0) < bench.turn_extra_s:
+        allowed = f"at least {bench.turn_extra_s:.3g} s, which the demands of the table of bench {bench.id} take"
+        raise BadParameter("rest_s", params.rest_s, allowed)
     for station in schedule(params):
         if station.angles is not None and (found := bench.violations(station.angles, station.turn)):
             raise BadParameter("rates_deg_s", params.rates_deg_s, f"station {station.label}: {'; '.join(found)}")
@@ -281,7 +303,7 @@ def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
 
 
 PROCEDURE = Procedure(
-    *("scale_factor_whole_turns", "Gyro scale factor by whole turns", "1.1.0"),
+    *("scale_factor_whole_turns", "Gyro scale factor by whole turns", "1.2.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
     planned_checks=planned_checks,
 )

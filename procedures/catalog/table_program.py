@@ -53,7 +53,7 @@ class Params(Parameters):
         None,
         min_length=1,
         max_length=500,
-        description="(outer, middle, inner) [deg] and delay [s], to be written as a program; not beside `program`",
+        description="(outer, middle, inner) [deg] and delay [s], written as a program; not together with `program`",
     )
     delay_from: Literal["demand", "rest"] = Field(
         "demand",

@@ -37,6 +37,7 @@ from procedures.analysis.calibration.triad_verification import (
 )
 from procedures.analysis.calibration.verification import predicted_sd
 from procedures.analysis.orientation_plan.requirements import IN_RUN_LEVEL, in_run_check, in_run_unresolved
+from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
@@ -45,6 +46,7 @@ from procedures.core.limits import Check, Limit, PlannedCheck, check, significan
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
+from procedures.dwells import DwellParameters, expected_stations, saved_tables
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.reports import diagnosis as diagnoses
@@ -72,7 +74,7 @@ class Limits(Parameters):
     prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the errors' chi-square")
 
 
-class Params(TableParameters):
+class Params(TableParameters, DwellParameters):
     """Orientations of the verification and limits of the unit. None takes the unit's or the bench's value.
 
     The accuracy of table and azimuth concerns the diagnosis alone; the magnitudes do not depend on it.
@@ -95,13 +97,16 @@ class Result(Outcome):
     """Magnitudes of both triads before and after correction, and their agreement with the prediction."""
 
     triads: tuple[TriadVerification, ...]
+    dwells: DwellsSaved | None = Field(
+        None, exclude_if=lambda saved: saved is None, description="of a stop rule: each dwell, and the time saved"
+    )
 
 
 def resolve(params: Params, context: Context) -> Params:
     """Dwell from the unit; site and table from the bench. Refuses a correction that the unit does not have."""
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
-    return full
+    return full.with_rule(context.unit)
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -117,6 +122,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.settle_s,
             params.dwell_s,
             temperatures=params.thermal_correction == "current",
+            until=params.until,
         )
         for i, (inner, middle, outer) in enumerate(params.orientations)
     )
@@ -130,9 +136,10 @@ def predict(params: Params, context: Context) -> Prediction:
     params = resolve(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     uncertainties = tuple(u for plan in plans for u in (*_predicted(plan), *_predicted_changes(plan, params, context)))
-    duration_s = float(windows(schedule(params), context.bench.axis_motion)[-1, 1])
-    rests_on = basis(plans) if uncertainties else ""
-    return Prediction(duration_s, uncertainties, _warnings(plans, params.limits), rests_on)
+    stations = schedule(params)
+    duration_s = float(windows(expected_stations(stations), context.bench.axis_motion)[-1, 1])
+    warnings = _warnings(plans, params.limits) + params.dwell_warnings(stations)
+    return Prediction(duration_s, uncertainties, warnings, basis(plans) if uncertainties else "")
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
@@ -142,7 +149,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Magnitudes of the corrected station means of both triads."""
+    """Compare the magnitudes of the corrected station means of both triads with gravity and the Earth's rate."""
     params = resolve(params, context)
     site = params.site(context)
     used = context.unit.thermal_correction if params.thermal_correction == "current" else None
@@ -159,7 +166,8 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     checks = tuple(c for t, p in zip(triads, plans, strict=True) for c in _checks(t, params.limits, p))
     warnings = _warnings(plans, params.limits) + launch_warnings(recordings) + doubts + _moved(triads)
-    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=triads)
+    saved = dwells_saved(recordings)
+    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=triads, dwells=saved)
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
@@ -186,7 +194,9 @@ def report(result: Result) -> Report:
     table = pictures.magnitude_table(magnitudes, "Verification, out of sample: other orientations and another launch")
     found = diagnoses.diagnosis_tables([t.diagnosis for t in result.triads if t.diagnosis is not None])
     said = " ".join(t.diagnosis.sentence if t.diagnosis else t.not_diagnosed for t in result.triads)
-    return Report(said, (table, *found, *figures, *(pictures.station_table(m) for m in magnitudes)))
+    return Report(
+        said, (table, *saved_tables(result.dwells), *found, *figures, *(pictures.station_table(m) for m in magnitudes))
+    )
 
 
 def _moved(triads: Sequence[TriadVerification]) -> tuple[str, ...]:
@@ -199,7 +209,8 @@ def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
     """Plan of a triad without the table's uncertainty, because magnitudes do not depend on the table's attitude."""
     calibration_of(context.unit, triad)
     site = params.site(context)
-    return triad_plan(triad, context.unit, schedule(params), context.bench.axis_motion, site, TableUncertainty())
+    stations = expected_stations(schedule(params))
+    return triad_plan(triad, context.unit, stations, context.bench.axis_motion, site, TableUncertainty())
 
 
 def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
@@ -268,7 +279,7 @@ def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check
 
 
 PROCEDURE = Procedure(
-    *("verification_9_orientations", "Verification in nine orientations", "1.2.0"),
+    *("verification_9_orientations", "Verification in nine orientations", "1.3.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
     uses_calibration=TRIAD_NAMES,
     uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.measured import Measured
+from procedures.core.sinusoid import Sinusoid
 from procedures.core.stop_rule import StopRule
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature_profile import TemperatureProfile
@@ -38,6 +39,8 @@ class Quantity(StrEnum):
     ANGULAR_RATE = "angular_rate"
     SPECIFIC_FORCE = "specific_force"
     TEMPERATURE = "temperature"
+    ANGLE = "angle"
+    TIME = "time"
 
 
 INCREMENTS = (Quantity.ANGLE_INCREMENT, Quantity.VELOCITY_INCREMENT)
@@ -47,8 +50,12 @@ UNITS: dict[Quantity, tuple[str, ...]] = {
     Quantity.ANGULAR_RATE: ("rad/s", "count"),
     Quantity.SPECIFIC_FORCE: ("m/s^2", "count"),
     Quantity.TEMPERATURE: ("degC", "count"),
+    Quantity.ANGLE: ("rad", "count"),
+    Quantity.TIME: ("s", "count"),
 }
 """Permitted units of a channel of each quantity; "count" marks a scale that is not known yet."""
+AROUND = (Quantity.TEMPERATURE, Quantity.ANGLE, Quantity.TIME)
+"""Quantities around the unit or beside its triads: no inertial channel has one."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +83,7 @@ class Channel:
     @property
     def rate_unit(self) -> str:
         """Unit of the channel once an increment is divided by the sample period."""
-        return {"rad": "rad/s", "m/s": "m/s^2", "count": "count"}.get(self.unit, self.unit)
+        return {"rad": "rad/s", "m/s": "m/s^2"}.get(self.unit, self.unit) if self.quantity in INCREMENTS else self.unit
 
     def value(self, raw: V) -> V:
         """``scale·(raw − offset)`` in the channel's `unit`, of a number or of an array."""
@@ -124,6 +131,8 @@ class Station:
     """Time for which the unit is switched off first [s]; above zero the station is a launch of its own."""
     turn: Turn | None = None
     """Whole turns of one axis that begin with the recording and are over, at rest again, before its end; None: none."""
+    sinusoid: Sinusoid | None = None
+    """Sinusoid of one axis under way during the whole recording, at rest again after it; None: none."""
     temperatures: bool = False
     """True if the unit's temperature sensors are recorded with its triads."""
     sample_rate_hz: float | None = None

@@ -7,6 +7,8 @@ from procedures.core.turn import AxisName
 
 LEAST_CYCLES = 3
 """Smallest number of cycles: the first and the last have a changing amplitude."""
+LEAD_CYCLES, LEAST_LEAD_S = 2, 0.5
+"""Cycles, and least time [s], after which the amplitude is constant and the servo's transient over."""
 PEAK_ACCELERATION = 1.12
 """Largest acceleration over that at constant amplitude, where the amplitude grows as ``10s³ − 15s⁴ + 6s⁵`` of the first
 cycle (1.1122, found by evaluation at 10⁶ points); the largest rate and excursion are those at constant amplitude.
@@ -38,6 +40,11 @@ class Sinusoid:
     def duration_s(self) -> float:
         """Duration from rest to rest [s]."""
         return self.cycles / self.frequency_hz
+
+    @property
+    def lead_s(self) -> float:
+        """Time from the begin after which the motion is taken to be steady [s]."""
+        return max(LEAD_CYCLES / self.frequency_hz, LEAST_LEAD_S)
 
     @property
     def rate_deg_s(self) -> float:

@@ -13,7 +13,7 @@ R = TypeVar("R")
 
 
 class Spread(Protocol):
-    """A place where parts are worked out at the same time."""
+    """Pool of processes in which parts of an analysis run at the same time."""
 
     @property
     def width(self) -> int:

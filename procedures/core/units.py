@@ -73,7 +73,7 @@ def converted(value: float, unit: str, wanted: str) -> float:
     for sizes in _SIZES.values():
         if unit in sizes and wanted in sizes:
             return value * sizes[unit] / sizes[wanted]
-    raise ValueError(f"it is in {unit}: {', '.join(units_like(unit))} can be asked for, {wanted} cannot")
+    raise ValueError(f"it is in {unit}: {', '.join(units_like(unit))} can be requested, {wanted} cannot")
 
 
 def units_like(unit: str) -> tuple[str, ...]:

@@ -75,7 +75,7 @@ def _text_file(file: str, delimiter: str, comment: str) -> Columns:
         raise ValueError(f"{len(cells)} names and {values.shape[1]} columns")
     names = tuple(cells) if is_header else tuple(f"column_{k}" for k in range(len(cells)))
     if len(set(names)) != len(names):
-        raise ValueError(f"a name stands twice in its header: {', '.join(names)}")
+        raise ValueError(f"its header has a name twice: {', '.join(names)}")
     return Columns(names, values)
 
 

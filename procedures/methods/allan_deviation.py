@@ -30,7 +30,7 @@ from procedures.analysis.launch.results import BandCurve
 from procedures.analysis.launch.spectrum import densities
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Limit, check, verdict
-from procedures.core.recording import INCREMENTS, Quantity, Recording
+from procedures.core.recording import AROUND, INCREMENTS, Recording
 from procedures.core.report import Report
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
@@ -59,7 +59,7 @@ class Params(RecordedParameters):
         "every whole number of samples; or a list [s], each taken as the nearest whole number of samples",
     )
     confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="confidence level of the intervals")
-    density: bool = Field(True, description="the power spectral density beside each curve; none of a record too short")
+    density: bool = Field(True, description="the power spectral density with each curve; none for a record too short")
     band: Literal["none", "all_starts", "sampled_intervals"] = Field(
         "none",
         description="all_starts: least, mean and greatest deviation over every start; sampled_intervals: `intervals` "
@@ -109,7 +109,7 @@ def report(result: Result) -> Report:
 
 def _curves(recording: Recording, statistic: Statistic, params: Params) -> tuple[Curve, ...]:
     info = recording.info
-    names = params.channels or tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
+    names = params.channels or tuple(c.name for c in info.channels if c.quantity not in AROUND)
     try:
         found = _deviations(recording, names, statistic, params, correlate=True)
     except Uncorrelatable:

@@ -34,7 +34,8 @@ class Params(RecordedParameters):
         1.0, gt=0.0, le=3600.0, description="averaging time of one measurement; lengthened for long recordings"
     )
     known_input: dict[str, float] = Field(
-        default_factory=dict[str, float], description="by channel, rad/s or m/s²: what it measures beside its bias"
+        default_factory=dict[str, float],
+        description="by channel, rad/s or m/s²: what it measures in addition to its bias",
     )
     gyro_prior_sd_deg_h: float | None = Field(
         None, gt=0.0, le=1e6, description="standard deviation of the bias about zero; None: unknown"

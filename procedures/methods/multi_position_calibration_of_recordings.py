@@ -46,7 +46,7 @@ class Params(FitParameters, RecordedParameters):
         None,
         min_length=1,
         max_length=500,
-        description="up in the unit's axes, of any length, one a recording; accelerometers alone; not beside positions",
+        description="up in the unit's axes, of any length, one a recording; accelerometers alone; not with positions",
     )
     direction_sd_arcsec: Arcsec = Field(0.0, description="standard uncertainty of each direction, about any axis")
     orthogonality_sd_arcsec: Arcsec = 0.0

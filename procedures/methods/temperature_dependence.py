@@ -32,7 +32,7 @@ from procedures.analysis.thermal.runs import without_lag
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import significance, verdict
-from procedures.core.recording import GYRO, Quantity, Recording, RecordingInfo
+from procedures.core.recording import AROUND, GYRO, Quantity, Recording, RecordingInfo
 from procedures.core.report import Report
 from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
 from procedures.core.unit import Unit
@@ -48,7 +48,7 @@ class Params(RecordedParameters):
     """Channels, sensors and how they are judged."""
 
     channels: tuple[str, ...] | None = Field(
-        None, min_length=1, max_length=64, description="None: all that are no temperatures"
+        None, min_length=1, max_length=64, description="None: all except temperatures"
     )
     sensor: str | None = Field(None, description="temperature channel; None: the only one that the recordings have")
     own_sensors: dict[str, str] = Field(
@@ -135,7 +135,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 def _channels(recordings: Sequence[Recording], params: Params) -> tuple[str, ...]:
     info = recordings[0].info
-    every = tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
+    every = tuple(c.name for c in info.channels if c.quantity not in AROUND)
     names = every if params.channels is None else params.channels
     for name in names:
         for recording in recordings:

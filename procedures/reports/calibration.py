@@ -58,6 +58,11 @@ def budget_table(triad: str, budgets: Sequence[Budget]) -> Table:
     return Table(f"Uncertainty budget of the {triad} triad", columns, tuple(rows), note)
 
 
+def budget_tables(triad: str, budgets: Sequence[Budget]) -> tuple[Table, ...]:
+    """The table of `budget_table`, or none of a result without budgets."""
+    return (budget_table(triad, budgets),) if budgets else ()
+
+
 def triad_figures(t: TriadSummary) -> tuple[Figure, ...]:
     """Figures of a triad: its magnitudes, then its residuals."""
     return (*magnitude_figures(t.magnitudes), residual_figure(t))

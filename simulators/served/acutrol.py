@@ -9,8 +9,11 @@ IDENTITY = "Acutronic USA, ACT3000, 0000000001, 01.02.12 (Build 1962)"
 PREFIX = bytes(range(8))
 """Eight bytes before each answer; their meaning is not known, so they are arbitrary here."""
 ROOTS = ("utility", "interlock", "mode", "demand", "read", "limit")
-SUBS = ("lockout", "reset", "close", "open", "off", "position", "rate", "acceleration", "absolute", "delta")
-MODE_WORDS = {"off": "Off", "position": "Position", "rate": "Rate"}
+SUBS = (
+    *("lockout", "reset", "close", "open", "off", "position", "rate", "acceleration", "absolute", "delta"),
+    *("oscillator", "synthesis"),
+)
+MODE_WORDS = {"off": "Off", "position": "Position", "rate": "Rate", "synthesis": "Synthesis"}
 LARGEST_STEP_DEG = 180.0
 
 
@@ -28,6 +31,8 @@ class AcutrolLanguage:
             ("mode", "off"): lambda a: self._mode(a, "off"),
             ("mode", "position"): lambda a: self._mode(a, "position"),
             ("mode", "rate"): lambda a: self._mode(a, "rate"),
+            ("mode", "synthesis"): lambda a: self._mode(a, "synthesis"),
+            ("demand", "oscillator"): self._oscillate,
             ("demand", "position"): lambda a: self._load(a, "position"),
             ("demand", "rate"): lambda a: self._load(a, "rate"),
             ("demand", "delta"): self._step,
@@ -98,6 +103,11 @@ class AcutrolLanguage:
 
     def _load(self, arguments: list[str], kind: str) -> str:
         self._table.load(kind, self._axis(arguments[0]), float(arguments[1]))
+        return OK
+
+    def _oscillate(self, arguments: list[str]) -> str:
+        amplitude, frequency, phase = map(float, arguments[1:4])
+        self._table.load_oscillator(self._axis(arguments[0]), amplitude, frequency, phase)
         return OK
 
     def _step(self, arguments: list[str]) -> str:

@@ -39,6 +39,42 @@ class Path:
         return Path(self.starts_s, self.positions + by, self.rates, self.accelerations)
 
 
+@dataclass(frozen=True)
+class Swing:
+    """Endless ``A·sin(2πft + φ)`` about a position, whose amplitude and phase φ grow from zero over the first cycle.
+
+    The growth ``10s³ − 15s⁴ + 6s⁵``, s = f·t, is this simulator's own: how a real controller begins is not known.
+    """
+
+    position: float
+    amplitude: float
+    frequency_hz: float
+    phase: float
+
+    @property
+    def duration_s(self) -> float:
+        """Time until it stands still by itself: never."""
+        return float("inf")
+
+    @property
+    def final_rate(self) -> float:
+        """Largest rate: it never stands still."""
+        return 2.0 * np.pi * self.frequency_hz * self.amplitude
+
+    def at(self, time_s: Array) -> tuple[Array, Array]:
+        """Positions and rates at some times, each (n,)."""
+        cycle = np.maximum(time_s, 0.0) * self.frequency_hz
+        s = np.minimum(cycle, 1.0)
+        size, slope = s**3 * (10.0 + s * (6.0 * s - 15.0)), 30.0 * (s * (1.0 - s)) ** 2
+        turn = 2.0 * np.pi * cycle + self.phase * size
+        rate = slope * np.sin(turn) + size * np.cos(turn) * (2.0 * np.pi + self.phase * slope)
+        return self.position + self.amplitude * size * np.sin(turn), self.amplitude * self.frequency_hz * rate
+
+    def shifted(self, by: float) -> "Swing":
+        """The same motion, its positions called by other names."""
+        return Swing(self.position + by, self.amplitude, self.frequency_hz, self.phase)
+
+
 def held(position: float) -> Path:
     """Path of an axis that rests at one angle."""
     return _path(position, 0.0, [])
@@ -86,11 +122,14 @@ def _path(
     return Path(np.array(starts), np.array(positions), np.array(rates), np.array([*accelerations, 0.0]))
 
 
+AxisPath = Path | Swing
+
+
 @dataclass(frozen=True)
 class Paths:
     """Paths of three axes that began at different times: a `Profile` of the plant."""
 
-    paths: tuple[Path, Path, Path]
+    paths: tuple[AxisPath, AxisPath, AxisPath]
     ages_s: tuple[float, float, float]
     """Age of each path at the profile's beginning [s]."""
 
@@ -116,7 +155,7 @@ class Paths:
         outer, middle, inner = (path.shifted(float(b)) for path, b in zip(self.paths, by, strict=True))
         return Paths((outer, middle, inner), self.ages_s)
 
-    def replaced(self, axis: int, path: Path) -> "Paths":
+    def replaced(self, axis: int, path: AxisPath) -> "Paths":
         """These paths with another one of an axis, which begins now."""
         paths, ages = list(self.paths), list(self.ages_s)
         paths[axis], ages[axis] = path, 0.0

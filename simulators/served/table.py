@@ -6,7 +6,7 @@ from math import isfinite, pi
 import numpy as np
 
 from simulators.clock import Motion, SimClock
-from simulators.served.axes import Path, Paths, held, to_position, to_rate
+from simulators.served.axes import AxisPath, Paths, Swing, held, to_position, to_rate
 from simulators.truth import Array, BenchTruth
 from simulators.turntable.device import (
     SETTLE_S,
@@ -19,7 +19,7 @@ from simulators.turntable.profile import MARGIN
 
 DEG = pi / 180.0
 CLOSED, OPEN, FAULT = "Closed", "Open", "Fault"
-MODES = ("off", "position", "rate")
+MODES = ("off", "position", "rate", "synthesis")
 
 
 class Refused(Exception):
@@ -33,6 +33,8 @@ class AxisState:
     mode: str = "position"
     position_deg: float = 0.0
     rate_deg_s: float = 0.0
+    oscillator: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    """Amplitude [deg], frequency [Hz] and phase [deg] of the synthesizer."""
     interlock: str = CLOSED
 
 
@@ -46,7 +48,7 @@ class ControlledTable(SimTurntable):
         self.axes = (AxisState(), AxisState(), AxisState())
         self.limits: dict[tuple[str, int], list[float]] = {
             (mode, k): [axis.rate_deg_s, axis.acceleration_deg_s2]
-            for mode in ("position", "rate")
+            for mode in ("position", "rate", "synthesis")
             for k, axis in enumerate(self.factory)
         }
         """(mode, axis) -> rate [deg/s], acceleration [deg/s²]."""
@@ -84,6 +86,22 @@ class ControlledTable(SimTurntable):
         if state.mode == kind:
             self._act(axis)
 
+    def load_oscillator(self, axis: int, amplitude_deg: float, frequency_hz: float, phase_deg: float) -> None:
+        """Load a sinusoid; it begins with the synthesizer's mode. Raises `Refused` beyond the limits of that mode."""
+        limits, most = self.factory[axis], self.limits["synthesis", axis]
+        if not all(map(isfinite, (amplitude_deg, frequency_hz, phase_deg))) or min(amplitude_deg, frequency_hz) <= 0.0:
+            raise Refused("parameter error")
+        here, omega = self.axes[axis].position_deg, 2.0 * pi * frequency_hz
+        if not limits.continuous and not (
+            limits.minimum_deg <= here - amplitude_deg and here + amplitude_deg <= limits.maximum_deg
+        ):
+            raise Refused("position limit")
+        if omega * amplitude_deg > most[0] or omega**2 * amplitude_deg > most[1]:
+            raise Refused("rate limit" if omega * amplitude_deg > most[0] else "acceleration limit")
+        if self.axes[axis].mode == "synthesis":
+            raise Refused("axis is in use")
+        self.axes[axis].oscillator = amplitude_deg, frequency_hz, phase_deg
+
     def set_limit(self, mode: str, axis: int, which: int, value: float) -> None:
         """Set rate (0) or acceleration (1) of a mode. Raises `Refused` beyond the factory's."""
         axis_limits = self.factory[axis]
@@ -98,6 +116,8 @@ class ControlledTable(SimTurntable):
             raise Refused("no such mode")
         if mode != "off" and self.axes[axis].interlock != CLOSED:
             raise Refused("interlock open")
+        if mode == "synthesis" and (self.axes[axis].oscillator[0] == 0.0 or self._set_point(axis)[1] != 0.0):
+            raise Refused("no oscillator demand" if self.axes[axis].oscillator[0] == 0.0 else "axis is moving")
         self.axes[axis].mode = mode
         self._act(axis)
 
@@ -134,6 +154,9 @@ class ControlledTable(SimTurntable):
             self._pointing[axis] = pointing_error_rad(self._truth.table, self._seed, self._moves)[axis]
             most, acceleration = (DEG * MARGIN * limit for limit in self.limits["position", axis])
             path = to_position(position, rate, self._target(axis), most, acceleration)
+        elif state.mode == "synthesis":
+            amplitude, frequency, phase = state.oscillator
+            path = Swing(position, DEG * amplitude, frequency, DEG * phase)
         else:
             target = DEG * state.rate_deg_s if state.mode == "rate" else 0.0
             path = to_rate(position, rate, target, DEG * MARGIN * self.limits["rate", axis][1])
@@ -156,7 +179,7 @@ class ControlledTable(SimTurntable):
         position, rate = self._paths.at(np.array([self._step * self._plant.step_s]))
         return float(position[0, axis]), float(rate[0, axis])
 
-    def _follow_paths(self, axis: int, path: Path) -> None:
+    def _follow_paths(self, axis: int, path: AxisPath) -> None:
         paths = self._paths
         if paths is None:
             outer, middle, inner = (held(float(angle)) for angle in self._plant.angles_rad)

@@ -14,7 +14,7 @@ import numpy as np
 from procedures.bench.description import BenchDescription
 from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
-from procedures.bench.turntable import TableReading
+from procedures.bench.turntable import NO_TRACE, EncoderTrace, TableReading, appended
 from procedures.core import units
 from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
@@ -63,6 +63,7 @@ class SimTurntable:
         self._step = 0
         self._demand = 0
         self._fault = ""
+        self._traced = NO_TRACE
         self._lean: Array | None = None
         """Rotation vector of the unit on the inner axis, (3,) [rad]; None: it is mounted exactly."""
         self._rest = self._at_rest()
@@ -107,6 +108,11 @@ class SimTurntable:
         amplitude = units.DEG * sinusoid.amplitude_deg
         axis = AXES.index(sinusoid.axis)
         self._begin(Sine(self._plant.angles_rad, axis, amplitude, sinusoid.frequency_hz, sinusoid.cycles))
+
+    def trace(self) -> EncoderTrace:
+        """Readings of each tick of a sinusoid since the last call; see the port. They are timed exactly."""
+        taken, self._traced = self._traced, NO_TRACE
+        return taken
 
     async def settle(self) -> None:
         """Let time pass until what was commanded is over and the axes rest; see the port."""
@@ -242,11 +248,21 @@ class SimTurntable:
             self._fault = str(fault)
             raise
         self._step += steps
+        if isinstance(self._profile, Sine):
+            self._traced = appended(
+                self._traced, self._seen(path[self._plant.steps_per_tick :: self._plant.steps_per_tick])
+            )
         if isinstance(self._profile, Spin):
             self._unwind(self._profile)
         rotation = self._leaning(attitude(path, self._truth.table, self._description.site.azimuth_deg))
         angle, velocity = path_increments(rotation, self._plant.steps_per_tick, tick_s, self._truth.site)
         return Motion(ticks, angle, velocity)
+
+    def _seen(self, joints_rad: Array) -> EncoderTrace:
+        """Encoder readings of true joint angles at the ends of the ticks that pass now, (ticks, 3)."""
+        shown = (joints_rad - self._pointing + 2.0 * np.pi * self._turns) / units.DEG
+        times: Array = (self._clock.ticks + np.arange(1, len(shown) + 1, dtype=np.float64)) / self._clock.rate_hz
+        return EncoderTrace(times, shown, np.zeros(len(shown)))
 
     def _unwind(self, spin: Spin) -> None:
         """Take whole turns out of a turning axis and of its setpoint: far from zero a servo never rests (rounding)."""

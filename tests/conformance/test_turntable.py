@@ -11,7 +11,7 @@ from procedures.bench.errors import BenchError, DeviceBusy, DeviceFault, Disconn
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
 from simulators.served.faults import Fault
-from tests.conformance.served import cancelled_at
+from tests.conformance.served import axis, cancelled_at
 from tests.conformance.tables import IMPLEMENTATIONS, TableRig, acutrol, table
 
 POINTING_DEG = 6.0 / 3600.0
@@ -305,3 +305,18 @@ def test_a_demand_that_is_still_being_given_does_not_outlive_make_safe(rig: Tabl
         assert _angles(reading) == pytest.approx(before, abs=POINTING_DEG)
 
     asyncio.run(scene())
+
+
+def test_turns_are_not_turned_back_where_the_controller_counts_them(tmp_path: Path) -> None:
+    """An axis that is declared with slip rings, and has none at its controller: its angle goes on to 360°."""
+
+    async def scene(rig: TableRig) -> None:
+        await rig.port.command_turn(Turn("outer", 1, 50.0, 1.0))
+        await rig.port.settle()
+        assert rig.served is not None
+        encoders = rig.served.do(lambda bench: bench.table.true_encoders_deg())
+        assert encoders[2] == pytest.approx(360.0, abs=POINTING_DEG)
+
+    swapped = {"outer": axis(3, 400.0, continuous=True), "middle": axis(2, 190.0), "inner": axis(1, 360.0)}
+    with table("acutrol", tmp_path, **swapped) as rig:
+        asyncio.run(scene(rig))

@@ -112,5 +112,5 @@ def test_units_of_one_kind_are_converted_and_others_refused() -> None:
     assert converted(1.0, "1", "ppm") == pytest.approx(1e6)
     assert converted(1.0, "µg", "m/s^2") == pytest.approx(9.80665e-6)
     assert converted(2.5, "bananas", "bananas") == 2.5
-    with pytest.raises(ValueError, match=r"rad/s, deg/s, deg/h can be asked for, ppm cannot"):
+    with pytest.raises(ValueError, match=r"rad/s, deg/s, deg/h can be requested, ppm cannot"):
         converted(1.0, "deg/h", "ppm")

@@ -127,3 +127,39 @@ def test_a_value_that_is_no_number_never_passes() -> None:
 def test_stored_results_of_before_have_no_decision() -> None:
     assert Outcome.model_validate({"verdict": "pass"}).statement is None
     assert "decision" not in JudgedParameters.model_validate({}).model_dump()
+
+
+@pytest.mark.parametrize(
+    ("value", "passed"),
+    [(-2.001, False), (-2.0, True), (0.0, True), (1.0, True), (1.001, False)]
+    + [(float(text), False) for text in ("nan", "inf", "-inf")],
+)
+def test_limits_hold_at_both_ends_and_let_nothing_through_that_is_not_finite(value: float, passed: bool) -> None:
+    assert check("v", value, Limit("1", maximum=1.0, minimum=-2.0)).passed is passed
+
+
+@pytest.mark.parametrize(
+    ("rule", "freedom", "sentence"),
+    [
+        (Rule(coverage_factor=2.0), None, "simple acceptance, U = 0.2 (k = 2): conditional pass"),
+        (
+            Rule("guarded", 0.5, coverage_factor=2.0),
+            None,
+            "guard band of 0.5·U, w = 0.1, U = 0.2 (k = 2): conditional fail",
+        ),
+        (Rule(), 5.0, "simple acceptance, U = 0.265 (k = 2.65, ν = 5): conditional pass"),
+    ],
+)
+def test_a_decision_reads_as_rule_band_uncertainty_and_outcome(
+    rule: Rule, freedom: float | None, sentence: str
+) -> None:
+    """0.05 inside the limit; Student's factor of five degrees of freedom is 2.65 (JCGM 100, table G.2)."""
+    found = decided(check("v", 0.95, Limit("1", maximum=1.0), 0.1, degrees_of_freedom=freedom), rule).decision
+    assert found is not None
+    assert found.sentence == sentence
+
+
+def test_a_value_without_uncertainty_has_no_guard_band() -> None:
+    found = decided(check("v", 0.95, Limit("1", maximum=1.0)), Rule("guarded")).decision
+    assert found is not None
+    assert (found.guard_band, found.expanded_uncertainty) == (0.0, None)

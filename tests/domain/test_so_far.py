@@ -116,7 +116,7 @@ def test_counts_and_stations_without_angles_have_no_coefficients_so_far() -> Non
     means, _ = accelerometer(np.random.default_rng(6), 1e-3, ANGLES)
     with pytest.raises(UnfitRecording, match="in count"):
         coefficients_so_far(replace(means, output_unit="count"), SITE, None, IDEAL)
-    with pytest.raises(UnfitRecording, match="no angles"):
+    with pytest.raises(UnfitRecording, match="no table angles"):
         coefficients_so_far(replace(means, angles=(None, *means.angles[1:])), SITE, None, IDEAL)
 
 

@@ -1,18 +1,22 @@
 """A stop rule of dwells: when it ends them, what guards it, that it does not bias, and refusals."""
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from procedures import catalog
 from procedures.analysis.recursive_bias.dwell import LiveDwell, expected_s, mean_sd
 from procedures.catalog import calibration_12_orientations as calibration
 from procedures.catalog.calibration_12_orientations import Params
 from procedures.core.errors import BadParameter, MissingChannel
+from procedures.core.imu_model import triad_calibration
 from procedures.core.noise import NoiseCoefficients
-from procedures.core.recording import Channel, MemoryRecording, Quantity, RecordingInfo
+from procedures.core.recording import Channel, MemoryRecording, Quantity, RecordingInfo, Station
 from procedures.core.stop_rule import ChannelTarget, StopRule
 from procedures.procedure import Context
 from simulators.truth import declared_unit, default_bench, default_unit
@@ -79,6 +83,49 @@ def test_an_optional_stop_does_not_bias_the_mean():
     assert abs(errors.std() - 1.0) < 4.0 / np.sqrt(2.0 * len(errors))
 
 
+def recorded(procedure: Any, stations: Sequence[Station]) -> list[MemoryRecording]:
+    """Recordings of the simulated bench, each as long as its dwell was."""
+
+    async def run() -> list[MemoryRecording]:
+        bench, found = build(WorldConfig(default_unit(), default_bench(), 5, RATE_HZ)), []
+        async for stream in procedure.acquire(bench, stations):
+            raw = np.concatenate([block async for block in stream.blocks])
+            info = RecordingInfo(f"r{len(found)}", "u", stream.channels, stream.rate_hz, len(raw), stream.start_s)
+            found.append(MemoryRecording(replace(info, station=stream.station, launched_s=0.0), raw))
+        await bench.make_safe()
+        return found
+
+    return asyncio.run(run())
+
+
+@pytest.mark.parametrize("name", ["verification_9_orientations", "multi_position_calibration"])
+def test_the_same_rule_ends_the_dwells_of_every_procedure_that_takes_means(name: str):
+    """One rule, one plan: what is predicted and claimed is that of a fixed dwell as long as the rule makes it."""
+    procedure = catalog.discover()[name]
+    truth = default_unit()
+    known = tuple(
+        triad_calibration(t, u, u, np.column_stack([truth.triad(t).bias, truth.triad(t).matrix]), 1e-16 * np.eye(12))
+        for t, u in (("gyro", "rad/s"), ("accelerometer", "m/s^2"))
+    )
+    context = replace(CONTEXT, unit=replace(CONTEXT.unit, calibrations=known))
+    given = {"dwell_s": 100.0, "stop_at": {"gyro_deg_h": 0.03}}
+    params = procedure.resolve(procedure.params.model_validate(given), context)
+    expected = params.stop_at.expected_s(100.0)
+    stations = procedure.schedule(params)
+    assert {s.until for s in stations} == {params.stop_at.rule}
+    result = procedure.analyse(recorded(procedure, stations), params, context)
+    assert {d.duration_s for d in result.dwells.dwells} == {expected}
+    assert all(d.by_rule for d in result.dwells.dwells)
+    assert any(s.title == "Dwells" for s in procedure.report(result).sections)
+    fixed = procedure.resolve(procedure.params.model_validate({"dwell_s": expected}), context)
+    planned, whole = procedure.predict(params, context), procedure.predict(fixed, context)
+    assert planned.duration_s == pytest.approx(whole.duration_s)
+    assert planned.uncertainties == whole.uncertainties
+    assert planned.duration_s < 0.8 * procedure.predict(params.model_copy(update={"stop_at": None}), context).duration_s
+    hard = procedure.params.model_validate({"dwell_s": 60.0, "stop_at": {"gyro_deg_h": 1e-6}})
+    assert any("no dwell will end before" in w for w in procedure.predict(hard, context).warnings)
+
+
 def test_a_calibration_ends_its_dwells_and_tells_what_it_saved():
     params = calibration.resolve(
         Params.model_validate({"dwell_s": 200.0, "stop_at": {"gyro_deg_h": 0.03}, "scalar_check": False}), CONTEXT
@@ -90,16 +137,7 @@ def test_a_calibration_ends_its_dwells_and_tells_what_it_saved():
     stations = calibration.schedule(params)
     assert {s.record_s for s in stations} == {200.0}
 
-    async def run() -> list[MemoryRecording]:
-        bench, found = build(WorldConfig(default_unit(), default_bench(), 5, RATE_HZ)), []
-        async for stream in calibration.acquire(bench, stations):
-            raw = np.concatenate([block async for block in stream.blocks])
-            info = RecordingInfo(f"r{len(found)}", "u", stream.channels, stream.rate_hz, len(raw), stream.start_s)
-            found.append(MemoryRecording(replace(info, station=stream.station, launched_s=0.0), raw))
-        await bench.make_safe()
-        return found
-
-    result = calibration.analyse(asyncio.run(run()), params, CONTEXT)
+    result = calibration.analyse(recorded(calibration, stations), params, CONTEXT)
     saved = result.dwells
     assert saved is not None
     assert [d.duration_s for d in saved.dwells] == [expected] * 12

@@ -160,7 +160,7 @@ def test_what_is_missing_is_said(runs: list[MemoryRecording], known: Context):
         ("disconnected", f"{SENSORS[2]} was disconnected"),
         ("short", "ends after 7 of 8 legs"),
         ("counts", "accelerometer_y is in count"),
-        ("no profile", "is no run of a thermal cycle"),
+        ("no profile", "is not a run of a thermal cycle"),
         ("twice", "with axis y up at least once"),
     ],
 )

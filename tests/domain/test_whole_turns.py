@@ -8,7 +8,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from procedures.analysis.calibration.table_errors import TableUncertainty
-from procedures.analysis.turns.fit import TERMS, Term, fit_turns, turning
+from procedures.analysis.turns.fit import TERMS, Term, fit_turns, turn_flaws, turning
 from procedures.analysis.turns.plan import UPRIGHT, TurnPlan, TurnProgram, bench_time_s, longer_needed
 from procedures.bench.description import AxisLimits
 from procedures.catalog.scale_factor_whole_turns import PROCEDURE
@@ -75,6 +75,47 @@ def test_the_earths_turn_is_that_of_the_motion_step_by_step(rate: float, turns: 
     stepped = np.linalg.solve(K_GYRO, outputs(station, Flaws(), zero, zero[:, 0]) - B_GYRO * station.record_s)
     # Simpson's error over 2000 steps of at most 1.1 deg is (1.1 deg)^4/180 of the Earth's 10″ a second.
     np.testing.assert_allclose((motion.turned_b + motion.earth_rad)[0], stepped, rtol=0, atol=1e-4 * ARCSEC)
+
+
+@pytest.mark.parametrize("rate", [10.0, 60.0])
+def test_the_earths_turn_changes_with_level_and_azimuth_as_the_flaws_say(rate: float) -> None:
+    """By difference of the motion step by step, over 60″; what a tilt changes across the axis is left out.
+
+    That is ``U·ε·|∫(cos, sin)θ dt|``, some seconds of rest and ramps of the whole: beneath a tenth of what is kept.
+    """
+    stations = TurnProgram((rate,), 60.0, 0.5, 2.0, 1.0).stations()
+    motion = turning(stations, np.array([s.record_s for s in stations]), SITE)
+    flaws, none = turn_flaws(motion, TableUncertainty(1.0, 1.0, 1.0, 1.0)), np.zeros((3, 2))
+    exact = np.array([outputs(s, Flaws(), none, none[:, 0]) for s in stations])
+    largest = np.abs(flaws.sensitivity[:, :, 2:5]).max()
+    for column, changed in ((2, Flaws(level=(60.0, 0.0))), (3, Flaws(level=(0.0, 60.0))), (4, Flaws(azimuth=60.0))):
+        found = np.array([outputs(s, changed, none, none[:, 0]) for s in stations]) - exact
+        foreseen = 60.0 * ARCSEC * flaws.sensitivity[:, :, column] @ K_GYRO.T
+        np.testing.assert_allclose(np.abs(found), np.abs(foreseen), atol=60.0 * ARCSEC * 0.1 * largest)
+
+
+def test_the_budget_of_each_coefficient_has_its_sources_and_makes_up_the_total(turnable: Context) -> None:
+    declared = replace(turnable.bench.accuracy, level_sd_arcsec=1.0, orthogonality_sd_arcsec=3.0)
+    site = replace(turnable.bench.site, azimuth_sd_arcsec=5.0)
+    bench = replace(turnable.bench, accuracy=replace(declared, pointing_sd_arcsec=1.0), site=site)
+    params, recordings = run(replace(turnable, bench=bench))
+    result = PROCEDURE.analyse(recordings, params, replace(turnable, bench=bench))
+    budgets = {str(b.coefficient): b for b in result.gyro.budgets}
+    assert list(budgets) == [str(c.name) for c in result.gyro.coefficients]
+    for c in result.gyro.coefficients:
+        b = budgets[str(c.name)]
+        assert np.sqrt(sum(r.contribution**2 for r in b.rows)) == pytest.approx(c.standard_uncertainty, rel=1e-9)
+        for source, part in c.from_table_source.items():
+            assert part == pytest.approx(sum(r.contribution for r in b.rows if r.source == source), rel=1e-9, abs=1e-18)
+    sources = {"random walk", "resolution (quantization)", "orthogonality", "pointing", "level", "azimuth"}
+    assert {r.source for r in budgets["gyro.b_x"].rows} == sources
+    # The stations about other axes give b_x without the tilt, so it can hardly enter: beneath Ω·cos φ·1″.
+    north = SITE.earth_rate_rad_s * np.cos(np.radians(SITE.latitude_deg)) * ARCSEC
+    of_level = next(r for r in budgets["gyro.b_x"].rows if r.source == "level")
+    assert (of_level.value, of_level.unit) == (pytest.approx(1.0), "arcsec")
+    assert 0.0 < of_level.contribution < north
+    titles = [getattr(section, "title", "") for section in PROCEDURE.report(result).sections]
+    assert "Uncertainty budget of the gyro triad" in titles
 
 
 def test_errors_have_the_spread_that_is_claimed_and_residuals_the_chi_square(turnable: Context) -> None:
@@ -170,7 +211,7 @@ def test_from_recordings_to_a_result_and_back(turnable: Context) -> None:
     (calibration,) = PROCEDURE.calibrations(result)
     np.testing.assert_allclose(calibration.matrix_array, K_GYRO, atol=2e-9)
     assert PROCEDURE.calibrations(result.model_copy(update={"make_calibration": False})) == ()
-    assert len(PROCEDURE.report(result).sections) == 5
+    assert len(PROCEDURE.report(result).sections) == 6
 
 
 def test_unknown_noise_is_estimated_from_the_residuals(turnable: Context) -> None:

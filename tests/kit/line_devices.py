@@ -14,7 +14,7 @@ from procedures.bench.chamber import ChamberLimits, ChamberReading
 from procedures.bench.device import DeviceIdentity, StatusWord
 from procedures.bench.errors import Disconnected, OutOfRange
 from procedures.bench.supply import SupplyLimits, SupplyReading
-from procedures.bench.turntable import TableReading
+from procedures.bench.turntable import NO_TRACE, EncoderTrace, TableReading
 from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
@@ -142,6 +142,9 @@ class LineTable(_Line):
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         raise OutOfRange("no sinusoids")
+
+    def trace(self) -> EncoderTrace:
+        return NO_TRACE
 
     async def settle(self) -> None:
         await self.ask("settle", moving=False)

@@ -13,11 +13,16 @@ REFERENCE = 50.0 * units.DEG
 
 @dataclass(frozen=True)
 class Flaws:
-    """Right angles [arcsec], and pointing at the start (outer, middle, inner) and of the outer axis at the stop."""
+    """Right angles [arcsec], and pointing at the start (outer, middle, inner) and of the outer axis at the stop.
+
+    Tilts of the outer axis about the reference frame's x and z, and the heading of the table's zero.
+    """
 
     orthogonality: tuple[float, float] = (0.0, 0.0)
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     stop: float = 0.0
+    level: tuple[float, float] = (0.0, 0.0)
+    azimuth: float = 0.0
 
 
 def outputs(station: Station, flaws: Flaws, even: np.ndarray, cubic: np.ndarray) -> np.ndarray:
@@ -39,9 +44,10 @@ def outputs(station: Station, flaws: Flaws, even: np.ndarray, cubic: np.ndarray)
         @ turn("y", flaws.orthogonality[1] * deg)
         @ turn("x", angles.inner_deg + flaws.start[2] * deg)
     )
-    latitude, azimuth = np.radians(SITE.latitude_deg), np.radians(SITE.azimuth_deg)
+    latitude, azimuth = np.radians(SITE.latitude_deg), np.radians(SITE.azimuth_deg + flaws.azimuth / 3600.0)
     north, above = SITE.earth_rate_rad_s * np.array([np.cos(latitude), np.sin(latitude)])
     earth = np.array([north * np.cos(azimuth), above, -north * np.sin(azimuth)])
+    earth = (turn("z", flaws.level[1] * deg) @ turn("x", flaws.level[0] * deg)).T @ earth
     on_ramp, steady, rest = (whole.ramp_s, ramp), (steady_s, 1.0 + 0 * up), (rest_s, 0 * up)
     for seconds, share in (on_ramp, steady, (whole.ramp_s, ramp[::-1]), rest):
         spin = rate * share

@@ -6,14 +6,26 @@ from typing import Any
 from simulators.served.unit_frames import CountFrames
 
 LANGUAGES = {"turntable": "acutrol", "supply": "scpi", "unit_link": "framed"}
+THERMAL_LANGUAGES = {**LANGUAGES, "chamber": "simserv"}
+AMBIENT_C = 22.0
+CHAMBER = """
+[chamber]
+driver = "simserv"
+address = "tcp://127.0.0.1:{}"
+after_set_s = 0.0
+limits = {{ minimum_c = -60, maximum_c = 85, ramp_c_min = 3, ambient_c = {} }}
+"""
 UNIT = """
 serial = "GL017"
 sample_rate_hz = 400
 """
 
 
-def bench_file(folder: Path, behind: Any, factor: float) -> Path:
-    """The bench file, the unit's file and the file of its frames."""
+def bench_file(folder: Path, behind: Any, factor: float, after_demand_s: float | None = None) -> Path:
+    """The bench file, the unit's file and the file of its frames; with a chamber where one is served.
+
+    `after_demand_s`: of the turntable; None: the driver's own.
+    """
     frames = behind.bench.frames
     assert isinstance(frames, CountFrames)
     (folder / "frame.toml").write_text(frames.description())
@@ -25,6 +37,8 @@ def bench_file(folder: Path, behind: Any, factor: float) -> Path:
     (folder / "units" / "GL017.toml").write_text(UNIT + channels)
     axis = "minimum_deg = -400, maximum_deg = 400, rate_deg_s = 60, acceleration_deg_s2 = 100"
     numbers = behind.numbers
+    chamber = "" if "chamber" not in numbers else CHAMBER.format(numbers["chamber"], AMBIENT_C)
+    pause = "" if after_demand_s is None else f"after_demand_s = {after_demand_s}"
     path = folder / "east.toml"
     path.write_text(f"""
 [bench]
@@ -35,10 +49,13 @@ gravity_m_s2 = 9.810553
 [turntable]
 driver = "acutrol"
 address = "tcp://127.0.0.1:{numbers["turntable"]}"
-outer = {{ number = 3, {axis}, continuous = true }}
+outer = {{ number = 1, {axis}, continuous = true }}
 middle = {{ number = 2, {axis} }}
-inner = {{ number = 1, {axis} }}
+inner = {{ number = 3, {axis} }}
 accuracy = {{ pointing_sd_arcsec = 2 }}
+sinusoidal = true
+{pause}
+{chamber}
 [supply]
 driver = "scpi"
 address = "tcp://127.0.0.1:{numbers["supply"]}"

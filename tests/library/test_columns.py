@@ -37,7 +37,7 @@ def test_numpy_files_give_their_columns(tmp_path: Path) -> None:
     ("text", "sentence"),
     [
         ("", "cannot be read"),
-        ("a,a\n1,2\n", "a name stands twice"),
+        ("a,a\n1,2\n", "its header has a name twice"),
         ("a,b\n1,\n", "cannot be read"),
         ("a,b\n1,2\n1,2,3\n", "cannot be read"),
         ("a,b\n1,x\n", "'x'"),

@@ -42,8 +42,9 @@ def main() -> int:
         copy = _copy(Path(folder) / "bench")
         for subject in wanted:
             command = [sys.executable, *_pytest(Path(folder)), *subject.tests]
-            if subprocess.run(command, cwd=copy, env=_environment(), capture_output=True, check=False).returncode:
-                print(f"{subject.name}: its tests fail without any defect: {' '.join(subject.tests)}")
+            sane = subprocess.run(command, cwd=copy, env=_environment(), capture_output=True, text=True, check=False)
+            if sane.returncode:
+                print(f"{subject.name}: its tests fail without any defect: {sane.stdout[-1500:]}{sane.stderr[-500:]}")
                 sound = False
                 continue
             _run(subject, given.tools.resolve() / "cosmic-ray", copy, command, given.mutants, given.seed)
@@ -77,16 +78,21 @@ def _run(subject: Subject, cosmic_ray: Path, copy: Path, command: list[str], mos
         f'[cosmic-ray]\nmodule-path = "{subject.module}"\ntimeout = {LONGEST_S}\nexcluded-modules = []\n'
         f'test-command = "{line}"\n[cosmic-ray.distributor]\nname = "local"\n'
     )
-    ask = {"cwd": copy, "env": _environment(), "check": True}
-    subprocess.run([cosmic_ray, "init", settings, session], **ask)
+    _asked(copy, cosmic_ray, "init", settings, session)
     places = _sample(session, most, seed)
-    subprocess.run([cosmic_ray, "exec", settings, session], **ask)
-    said = subprocess.run([cosmic_ray, "dump", session], capture_output=True, text=True, **ask).stdout
+    _asked(copy, cosmic_ray, "exec", settings, session)
+    said = _asked(copy, cosmic_ray, "dump", session)
     results = [json.loads(one)[1] for one in said.splitlines()]
     survivors = [one for one in results if one["test_outcome"] == "survived"]
     print(f"{subject.name}: {len(results) - len(survivors)} of {len(results)} killed ({places} places)", flush=True)
     for one in survivors:
         print("\n".join(f"    {part}" for part in one["diff"].splitlines()[3:]), flush=True)
+
+
+def _asked(copy: Path, *command: Path | str) -> str:
+    """Run a command in the copy; what it prints. Raises `CalledProcessError`."""
+    done = subprocess.run(command, cwd=copy, env=_environment(), stdout=subprocess.PIPE, text=True, check=True)
+    return done.stdout
 
 
 def _sample(session: Path, most: int, seed: int) -> int:

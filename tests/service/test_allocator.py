@@ -1,6 +1,7 @@
-"""The limit on the C library's arenas, asked of that library itself: threads that allocate at once share the two."""
+"""The limits of the C library's allocator, read from that library itself: two arenas, large blocks apart."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,10 +12,10 @@ GLIBC = "glibc" in (os.confstr("CS_GNU_LIBC_VERSION") or "") if "CS_GNU_LIBC_VER
 pytestmark = pytest.mark.skipif(not GLIBC, reason="another C library has no arenas of this kind")
 ARENAS_OF_THREADS = """
 import ctypes, sys, threading
-from bench_service.cli.processes.allocator import few_arenas
+from bench_service.cli.processes.allocator import limit_allocator
 
 if sys.argv[2] == "limited":
-    assert few_arenas()
+    assert limit_allocator()
 libc = ctypes.CDLL(None)
 libc.malloc.restype, libc.malloc.argtypes = ctypes.c_void_p, (ctypes.c_size_t,)
 barrier = threading.Barrier(12)
@@ -44,6 +45,38 @@ def arenas(folder: Path, how: str, **environment: str) -> int:
     command = [sys.executable, "-c", ARENAS_OF_THREADS, str(report), how]
     subprocess.run(command, check=True, timeout=60, env={**bare, **environment})
     return report.read_text().count("<heap nr=")
+
+
+LARGE_BLOCKS = """
+import ctypes, sys
+from bench_service.cli.processes.allocator import MAPPED_BYTES, limit_allocator
+
+if sys.argv[2] == "limited":
+    assert limit_allocator()
+libc = ctypes.CDLL(None)
+libc.malloc.restype, libc.malloc.argtypes = ctypes.c_void_p, (ctypes.c_size_t,)
+libc.free.argtypes = (ctypes.c_void_p,)
+libc.free(libc.malloc(4 * MAPPED_BYTES))  # from now on glibc would place smaller ones on the heap
+held = libc.malloc(2 * MAPPED_BYTES)
+libc.fopen.restype = ctypes.c_void_p
+file = libc.fopen(sys.argv[1].encode(), b"w")
+libc.malloc_info(0, ctypes.c_void_p(file))
+libc.fclose(ctypes.c_void_p(file))
+"""
+
+
+def mapped_mb(folder: Path, how: str) -> float:
+    report = folder / f"malloc-{how}.xml"
+    bare = {name: value for name, value in os.environ.items() if not name.startswith("MALLOC_")}
+    subprocess.run([sys.executable, "-c", LARGE_BLOCKS, str(report), how], check=True, timeout=60, env=bare)
+    found = re.search(r'<total type="mmap" count="\d+" size="(\d+)"', report.read_text())
+    assert found is not None
+    return int(found[1]) / 1e6
+
+
+def test_a_large_block_is_mapped_apart_also_after_a_larger_one_was_freed(tmp_path: Path) -> None:
+    assert mapped_mb(tmp_path, "limited") > 8.0
+    assert mapped_mb(tmp_path, "unlimited") < 8.0, "the limit would show nothing"
 
 
 def test_twelve_threads_share_two_arenas(tmp_path: Path) -> None:

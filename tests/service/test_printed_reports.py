@@ -219,8 +219,11 @@ def test_a_rejected_calibration_is_marked(calibrated: Calibrated) -> None:
 
 
 def test_pages_lead_to_the_reports(calibrated: Calibrated) -> None:
-    for page in (f"/results/{calibrated.result}", "/units/SIM-0001"):
-        assert f"/api/v1{page}/report.pdf" in calibrated.client.http.get(page).text
+    result = f"/results/{calibrated.result}"
+    job = calibrated.client.http.get(f"/api/v1{result}").json()["lineage"]["job"]
+    for page, reported in ((result, result), (f"/jobs/{job}", result), ("/units/SIM-0001", "/units/SIM-0001")):
+        assert f"/api/v1{reported}/report.pdf" in calibrated.client.http.get(page).text
+    assert "procedure=verification_9_orientations" in calibrated.client.http.get("/").text
 
 
 def test_a_static_run_shows_the_noise_as_found_and_as_left_and_its_trend(calibrated: Calibrated) -> None:

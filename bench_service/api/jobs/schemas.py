@@ -126,7 +126,7 @@ class JobView(BaseModel):
     pause_requested: bool = Field(description="Whether it pauses before its next station")
     queue: PlaceView | None = Field(description="Its place while it is queued")
     waiting: str | None = Field(description="Reason why it does not run now, as a sentence")
-    resumable: bool = Field(description="Whether it can be queued again to go on where it ended")
+    resumable: bool = Field(description="Whether it can be queued again to continue where it ended")
     retries: int = Field(description="Number of retries after a fault of the bench")
     retries_left: int
     not_before: datetime | None = Field(description="Earliest time of the next attempt")

@@ -47,7 +47,7 @@ def run_campaign(
         list[str], typer.Option("--set", help="A parameter, step.name=JSON value; may be repeated")
     ] = NO_ITEMS,
     label: Annotated[list[str], typer.Option(help="name=text; may be repeated")] = NO_ITEMS,
-    key: Annotated[str | None, typer.Option(help="Idempotency key: repeated with it, the run goes on")] = None,
+    key: Annotated[str | None, typer.Option(help="Idempotency key: repeated with it, the run continues")] = None,
     junit: Annotated[Path | None, typer.Option(dir_okay=False, help="Write JUnit XML to this file")] = None,
     server: Server = None,
     as_json: AsJson = False,

@@ -61,7 +61,9 @@ def make(
     unit: str,
     calibration_id: str,
     laboratory: Annotated[Path, typer.Option(help="TOML: identifier, laboratory, customer, people, equipment")],
-    key_file: Annotated[Path, typer.Option("--key", help="The laboratory's lab.key.pem; lab.cert.pem is beside it")],
+    key_file: Annotated[
+        Path, typer.Option("--key", help="The laboratory's lab.key.pem; lab.cert.pem is in the same folder")
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write, .xml")],
     pdf: Annotated[Path | None, typer.Option(help="Print it to this file too: PDF/A-3 with the XML inside")] = None,
     failed: Annotated[bool, typer.Option("--failed", help="Also of a calibration that failed; it says so")] = False,

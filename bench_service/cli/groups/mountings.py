@@ -27,7 +27,7 @@ def enter(
     context: typer.Context,
     unit: Annotated[str, typer.Argument(help="Serial of the unit")],
     bench: Annotated[str | None, typer.Option(help="Bench; without it, the one of jobs that name none")] = None,
-    plate: Annotated[str | None, typer.Option(help="Name of the plate; without it, it is asked")] = None,
+    plate: Annotated[str | None, typer.Option(help="Name of the plate; without it, the command asks")] = None,
     azimuth_deg: Annotated[
         float | None, typer.Option(help="Heading of the unit's x at zero angles, from north")
     ] = None,

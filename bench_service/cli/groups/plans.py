@@ -90,7 +90,7 @@ def _plans_of(file: Path) -> list[dict[str, Any]]:
     try:
         plans = json.loads(text_of(file))
     except ValueError as error:
-        raise Refused(f"{file} is no JSON: {error}") from error
+        raise Refused(f"{file} is not JSON: {error}") from error
     if not isinstance(plans, list) or not all(isinstance(plan, dict) for plan in plans):
         raise Refused(f"{file}: a list of plans is needed, each an object with procedure, unit, parameters, bench")
     return plans

@@ -60,7 +60,8 @@ def check_table(document: dict[str, Any]) -> Table:
 
 def budget_table(document: dict[str, Any], coefficient: str) -> Table:
     """Uncertainty budget of one coefficient, named as in the result ("gyro.K11"). Raises `KeyError` with the names."""
-    found = {b["coefficient"]: b for triad in document.get("triads", []) for b in triad.get("budgets", [])}
+    parts = [*document.get("triads", []), document.get("gyro") or {}, document.get("accelerometer") or {}]
+    found = {b["coefficient"]: b for part in parts for b in part.get("budgets", [])}
     if coefficient not in found:
         raise KeyError(", ".join(found) or "none: the result has no budget")
     budget = found[coefficient]
@@ -88,7 +89,7 @@ def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
     """Table of calibrations: their origin, which one counts and by whose choice, and how long."""
     table = Table()
     for column in ("calibration", "triad", "made", "method", "verdict", "current", "approval", "valid until"):
-        table.add_column(column, overflow="fold")
+        table.add_column(column, overflow="fold", no_wrap=column == "calibration")
     for one in calibrations:
         chosen = ("by rule" if one["by_rule"] else "chosen") if one["current"] else ""
         origin = f"{one['method']}: {one['origin']}" if one["origin"] else one["method"]

@@ -15,7 +15,7 @@ import uvicorn
 from bench_service.api.access.identify import Proxies, behind_proxies
 from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
-from bench_service.cli.processes.allocator import few_arenas
+from bench_service.cli.processes.allocator import limit_allocator
 from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
@@ -73,7 +73,7 @@ def _opened(
     set_up(settings, level)
     sys.setswitchinterval(SWITCH_S)
     protect(settings)
-    few_arenas()
+    limit_allocator()
     BoundedConnections.most = raise_descriptors()
     if socket_file is None:
         check_address(settings)

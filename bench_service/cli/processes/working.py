@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from bench_service.app import open_service
-from bench_service.cli.processes.allocator import few_arenas
+from bench_service.cli.processes.allocator import limit_allocator
 from bench_service.cli.processes.companion import accompanied
 from bench_service.cli.processes.ending import ending_on_signals
 from bench_service.cli.processes.logs import set_up
@@ -20,7 +20,7 @@ def work(settings: Settings, say: Callable[[str], object]) -> None:
     """
     set_up(settings, "info")
     protect(settings)
-    few_arenas()
+    limit_allocator()
     ending = ending_on_signals()
     started = threading.Event()
     with accompanied(settings, lambda: started.is_set() and not ending.is_set()), ExitStack() as closing:

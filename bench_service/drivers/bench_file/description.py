@@ -27,6 +27,11 @@ from procedures.core.site import Site
 NO_ANGLES = AxisLimits(0.0, 0.0, 1.0, 1.0)
 AXES = ("outer", "middle", "inner")
 
+MOST_TURN_EXTRA_S = 60.0
+"""Longest time of a table's demands for whole turns [s, bench time]: half of it is before the turns, when the unit's
+data wait (`bench_service.drivers.devices.unit_recordings.HELD_S`).
+"""
+
 
 def described(
     file: BenchFile, simulated: BenchDescription | None, found: Mapping[Kind, Found] | None = None
@@ -46,6 +51,7 @@ def described(
     table = sections["turntable"]
     assert isinstance(table, TurntableSection)
     real_table = isinstance(table, Wire)
+    extra_s = table.turn_extra_s(file.time_factor) if real_table else 0.0
     accuracy = _accuracy(table.accuracy) if real_table or simulated is None else simulated.accuracy
     return BenchDescription(
         rest.bench.id,
@@ -61,9 +67,25 @@ def described(
         current_source=_current(sections.get("current_source"), simulated),
         supply=_supply(sections["supply"], simulated),
         sinusoidal=table.sinusoidal if real_table or simulated is None else simulated.sinusoidal,
+        turn_extra_s=extra_s,
+        no_turns=_no_turns(file, extra_s),
         devices=_devices(file, told),
         expired_certificates=rest.policy.expired_certificate,
         no_thermal_jobs=_no_thermal_jobs(file),
+    )
+
+
+def _no_turns(file: BenchFile, extra_s: float) -> str:
+    """The reason why no job with whole turns runs: at this time factor the table's demands take too long."""
+    if extra_s <= MOST_TURN_EXTRA_S:
+        return ""
+    table = file.devices["turntable"]
+    assert isinstance(table, TurntableSection)
+    steps = (n / 10.0 for n in range(1, round(10.0 * file.time_factor)))
+    largest = max((f for f in steps if table.turn_extra_s(f) <= MOST_TURN_EXTRA_S), default=0.0)
+    return (
+        f"simulation.time_factor = {file.time_factor:g}: whole turns would take {extra_s:.0f} s of bench time for the "
+        f"table's demands alone, more than {MOST_TURN_EXTRA_S:g} s; a factor of at most {largest:g} lets them run"
     )
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Literal, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from bench_service.drivers.answers import Refusal
 from bench_service.drivers.devices.wire import Greeting, Note, accepted, line_times
@@ -19,6 +19,10 @@ from procedures.bench.errors import DeviceFault
 
 T = TypeVar("T")
 ENDINGS = {"crlf": b"\r\n", "lf": b"\n", "cr": b"\r"}
+TURN_SETS, TURN_SETTLES_S = 8, 3.0
+"""Statements before and after whole turns, and bench time for rest, the way back and rest again [s]."""
+ANSWER_S, CROWDED_S = 0.04, 0.5
+"""Time of an answer, and of all readings of rest together, on a crowded machine [s, real time]."""
 SENT_BACK = 10.0**-acutrol.DECIMALS
 """Largest difference of a demand read back: one unit of its last decimal."""
 
@@ -44,14 +48,9 @@ class AcutrolSection(WireTurntable):
     settle_s: Positive = 30.0
     """Longest time between the planned end of a motion and rest [s]."""
 
-    @model_validator(mode="after")
-    def _has_no_sinusoid(self) -> "AcutrolSection":
-        if self.sinusoidal:
-            raise ValueError(
-                "sinusoidal = true: this driver does not support sinusoids: "
-                "it is not documented how the controller starts one"
-            )
-        return self
+    def turn_extra_s(self, factor: float) -> float:
+        """Time of the statements that begin and end whole turns, and of settling [s, bench time]."""
+        return factor * (TURN_SETS * (self.after_demand_s + ANSWER_S) + CROWDED_S) + TURN_SETTLES_S
 
 
 class AcutrolLink:
@@ -106,10 +105,12 @@ class AcutrolLink:
         return status
 
     async def limit(self, mode: Mode, index: int, rate_deg_s: float, acceleration_deg_s2: float) -> None:
-        """Set rate and acceleration of one mode of an axis, and read both back."""
+        """Set rate and acceleration of one mode of an axis, and read both back; one that reads so already is left."""
         axis = self.axes[index]
         quantities: tuple[tuple[Quantity, float], ...] = (("rate", rate_deg_s), ("acc", acceleration_deg_s2))
         for quantity, value in quantities:
+            if abs(await self._number(acutrol.limit_query(quantity, mode, axis)) - value) <= SENT_BACK:
+                continue
             await self._set(acutrol.limit_statement(quantity, mode, axis, value))
             found = await self._number(acutrol.limit_query(quantity, mode, axis))
             self._same(f"{quantity} limit of axis {axis} in {mode} mode", value, found)
@@ -123,15 +124,19 @@ class AcutrolLink:
             found = await self._number(acutrol.demand_query(kind, axis))
             self._same(f"{kind} demand of axis {axis}", value, found)
 
+    async def oscillator(self, index: int, amplitude_deg: float, frequency_hz: float) -> None:
+        """Load a sinusoid of an axis. No query of it was seen: its motion is what is read back."""
+        await self._set(acutrol.oscillator_demand(self.axes[index], amplitude_deg, frequency_hz, 0.0))
+
     async def mode(self, mode: Mode, indices: Sequence[int] = (0, 1, 2)) -> None:
         """Set the mode of some axes at which a loaded demand acts, and read it back; an axis in it is left alone."""
         for index in indices:
             axis = self.axes[index]
-            if await self.mode_of(index) == mode:
+            if is_mode(await self.mode_of(index), mode):
                 continue
             await self._set(acutrol.mode_statement(axis, mode))
             found = await self.mode_of(index)
-            if found != mode:
+            if not is_mode(found, mode):
                 raise DeviceFault(f"axis {axis} of the turntable was set to {mode} mode and reads back {found}")
 
     async def mode_of(self, index: int) -> str:
@@ -186,3 +191,8 @@ class AcutrolLink:
                 Bound(f"{name}.acceleration_deg_s2", own.acceleration_deg_s2),
             ]
         self.own = tuple(found)
+
+
+def is_mode(word: str, mode: Mode) -> bool:
+    """True if a controller's word names a mode; that of the synthesizer was seen in its short form alone."""
+    return word.startswith(acutrol.MODES["synthesis"]) if mode == "synthesis" else word == mode

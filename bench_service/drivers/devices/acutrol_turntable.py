@@ -7,16 +7,16 @@ import asyncio
 from collections.abc import Callable
 from math import sqrt
 
-from bench_service.drivers.devices.acutrol_link import AcutrolSection
-from bench_service.drivers.devices.acutrol_watch import POLL_S, STOPPED, WatchedTable
+from bench_service.drivers.devices.acutrol_link import AcutrolSection, is_mode
+from bench_service.drivers.devices.acutrol_swing import SwingingTable
+from bench_service.drivers.devices.acutrol_watch import POLL_S, STOPPED
 from bench_service.drivers.devices.table_axes import AXES, TurnProgress, angles_of, declared, steps, wrapped
 from bench_service.drivers.interface.driver import DeviceDriver, Found, narrowed
 from procedures.bench.description import BenchDescription
 from procedures.bench.device import DeviceIdentity
-from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
+from procedures.bench.errors import DeviceFault, NotSettled, Stopped
 from procedures.bench.turntable import TableReading
 from procedures.core.constant_rate import ConstantRate
-from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
 
@@ -24,7 +24,7 @@ MOST_LEFT_DEG = 170.0
 """Largest angle between the stop of turns and their end: beyond it the shorter way would be another number of turns."""
 
 
-class AcutrolTurntable(WatchedTable):
+class AcutrolTurntable(SwingingTable):
     """Table whose every motion is watched by its encoders. A cancelled motion continues to its end by itself."""
 
     async def connect(self) -> Found:
@@ -102,10 +102,6 @@ class AcutrolTurntable(WatchedTable):
             self._end(demand)
             raise
 
-    async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
-        """Refuse; see the port: how this controller begins a sinusoid is not known. Raises `OutOfRange`."""
-        raise OutOfRange(f"{sinusoid.axis}: the driver of this table does not support sinusoids")
-
     async def settle(self) -> None:
         """Wait for the end of the commanded turns; see the port."""
         if (turning := self._turning) is not None:
@@ -142,23 +138,17 @@ class AcutrolTurntable(WatchedTable):
                 await self._link.demand("position", index, state.position_deg)
                 await self._link.mode("position", [index])
 
-    async def _prepare_brake(self, demand: int) -> None:
-        """Set the limits of rate mode before a motion, so that a stop needs two statements an axis."""
-        if self._can_brake:
-            return
-        for index, axis in enumerate(self._axes()):
-            self._require_current(demand)
-            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-        self._can_brake = True
-
     async def _brake(self, braked: list[int]) -> None:
         """Take the rate away from each axis that moves, the fastest one first, and note it as `braked`."""
         states = await self._link.states()
         moving = [k for k, state in enumerate(states) if abs(state.rate_deg_s) > self._section.rest_rate_deg_s]
         for index in sorted(moving, key=lambda k: -abs(states[k].rate_deg_s)):
             braked.append(index)
-            await self._link.demand("rate", index, 0.0)
-            await self._link.mode("rate", [index])
+            await self._stop_at_rate(index)
+        for index in range(len(states)):  # one that swings stands still where it turns
+            if index not in braked and is_mode(await self._link.mode_of(index), "synthesis"):
+                braked.append(index)
+                await self._stop_at_rate(index)
 
     def close(self) -> None:
         """Drop the line; see `WireDevice`."""
@@ -242,15 +232,10 @@ class AcutrolTurntable(WatchedTable):
             raise DeviceFault(f"the {turn.axis} axis stopped {left_deg:g} deg before the end of its turns")
         end = here + left_deg
         await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-        await self._link.demand("position", index, self._demanded(index, end))
+        await self._link.demand("position", index, self._demanded(index, end, here))
         await self._link.mode("position", [index])
         ends = [end if k == index else angle for k, angle in enumerate(start)]
         await self._wait_for_rest(ends, _duration_s(abs(left_deg), axis.rate_deg_s, axis.acceleration_deg_s2), demand)
-
-    def _demanded(self, index: int, angle_deg: float) -> float:
-        """Angle as the controller takes it: of one turn where its encoder reads within one."""
-        within_one = self._counts[index].counts or getattr(self._section, AXES[index]).continuous
-        return wrapped(angle_deg) if within_one else angle_deg
 
     async def _stop_axis(self, index: int) -> None:
         """Take the rate away from an axis whose turns are not followed any more; quiet where that fails as well."""

@@ -11,6 +11,8 @@ from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
 
 POLL_S = 0.05
 """Time between two readings of a moving table [s]."""
+TURNED_DEG = 1.0
+"""Distance from a whole turn within which a reading shows that the controller counts turns [deg]."""
 AT_REST = 3
 """Number of readings in a row that make rest."""
 STATUS_EVERY = 20
@@ -115,3 +117,27 @@ class WatchedTable:
                 return False
             await self._clock.sleep(POLL_S)
         return True
+
+    async def _prepare_brake(self, demand: int) -> None:
+        """Set the limits of rate mode before a motion, so that a stop needs two statements an axis."""
+        if self._can_brake:
+            return
+        for index, axis in enumerate(self._axes()):
+            self._require_current(demand)
+            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+        self._can_brake = True
+
+    async def _stop_at_rate(self, index: int) -> None:
+        """Take the rate away from an axis: two statements."""
+        await self._link.demand("rate", index, 0.0)
+        await self._link.mode("rate", [index])
+
+    def _demanded(self, index: int, angle_deg: float, here_deg: float) -> float:
+        """Angle as the controller takes it, for an axis that reads `here_deg`: of one turn where its encoder is so.
+
+        A controller that reads more than a turn counts turns, whatever is declared: the angle within one turn would
+        make it turn all of them back.
+        """
+        within_one = self._counts[index].counts or getattr(self._section, AXES[index]).continuous
+        counts_turns = not self._counts[index].counts and abs(here_deg) > 360.0 - TURNED_DEG
+        return wrapped(angle_deg) if within_one and not counts_turns else angle_deg

@@ -14,7 +14,7 @@ from procedures.bench.errors import Disconnected, NotPowered, OutOfRange
 from procedures.bench.imu import Stream
 from procedures.core.recording import Channel, Quantity, Station
 
-HELD_S = 10.0
+HELD_S = 30.0
 """Length of data that may wait to be recorded [s of the unit]; beyond it a recording ends."""
 BLOCK_S = 0.25
 """Length of a block [s of the unit]."""

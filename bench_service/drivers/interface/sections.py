@@ -97,6 +97,10 @@ class TurntableSection(DeviceSection):
     on_safe: Literal["hold", "off"] = "hold"
     """State after the axes have come to rest: held by the servo, or with the servo off."""
 
+    def turn_extra_s(self, factor: float) -> float:
+        """Time that whole turns take beyond their own, for demands at a time factor [s, bench time]."""
+        return 0.0
+
 
 class WireTurntable(TurntableSection, Wire):
     """Base of the section of a real turntable: its axes must be declared."""

@@ -10,12 +10,14 @@ from typing import Literal
 
 from bench_service.drivers.answers import BadAnswer, Refusal, shown
 
-Mode = Literal["position", "rate", "off"]
+Mode = Literal["position", "rate", "synthesis", "off"]
 Quantity = Literal["rate", "acc"]
 DECIMALS = 5
 """Decimals of a demand: the controller's command resolution is 0.00001 deg and deg/s."""
-MODES: dict[str, str] = {"position": "pos", "rate": "rate"}
+MODES: dict[str, str] = {"position": "pos", "rate": "rate", "synthesis": "synt"}
 """Name of a mode in the statement of its limits."""
+MODE_STATEMENTS: dict[str, str] = {"synthesis": "synt"}
+"""Name of a mode in its own statement, where that was seen in another form."""
 SERVICE_REQUEST, INTERLOCK_FAULT = 64, 1
 STATUS_BITS = {0: "interlock fault", 6: "service request"}
 """Bits of `*stb?`: 65 was seen at an interlock fault; the split into two bits is inferred."""
@@ -78,6 +80,11 @@ def rate_demand(axis: int, rate_deg_s: float) -> str:
     return f":demand:rate {axis},{number(rate_deg_s)}"
 
 
+def oscillator_demand(axis: int, amplitude_deg: float, frequency_hz: float, phase_deg: float) -> str:
+    """Statement that loads a sinusoid; it acts once the axis is in the synthesizer's mode."""
+    return f":demand:oscillator {axis},{number(amplitude_deg)},{number(frequency_hz)},{number(phase_deg)}"
+
+
 def demand_query(kind: Literal["position", "rate"], axis: int) -> str:
     """Query of a loaded demand: by the grammar of queries, not seen in a driver."""
     return f":demand:{kind}? {axis}"
@@ -85,7 +92,7 @@ def demand_query(kind: Literal["position", "rate"], axis: int) -> str:
 
 def mode_statement(axis: int, mode: Mode) -> str:
     """Statement that sets the mode of an axis."""
-    return f":mode:{mode} {axis}"
+    return f":mode:{MODE_STATEMENTS.get(mode, mode)} {axis}"
 
 
 def mode_query(axis: int) -> str:
@@ -131,7 +138,9 @@ def text(dialect: Dialect, answer: bytes) -> str:
     try:
         found = rest.decode("ascii").strip()
     except UnicodeDecodeError:
-        raise BadAnswer(f"{shown(answer)} is no text after reply_prefix_bytes = {dialect.reply_prefix_bytes}") from None
+        raise BadAnswer(
+            f"{shown(answer)} is not text after reply_prefix_bytes = {dialect.reply_prefix_bytes}"
+        ) from None
     if not found or not found.isprintable():
         raise BadAnswer(
             f"{shown(answer)} has no printable text after reply_prefix_bytes = {dialect.reply_prefix_bytes}"
@@ -187,7 +196,7 @@ def word(dialect: Dialect, answer: bytes) -> str:
     """One word in lower case, as a mode or an interlock. Raises `BadAnswer`."""
     found = text(dialect, answer)
     if not found.replace(" ", "").isalpha():
-        raise BadAnswer(f"{found!r} is no word")
+        raise BadAnswer(f"{found!r} is not a word")
     return found.casefold()
 
 

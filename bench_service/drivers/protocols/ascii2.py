@@ -98,7 +98,7 @@ def state(layout: Layout, answer: bytes) -> State:
     try:
         parts = answer.decode("ascii").split()
     except UnicodeDecodeError:
-        raise BadAnswer(f"{shown(answer)} is no text") from None
+        raise BadAnswer(f"{shown(answer)} is not text") from None
     if len(parts) != 2 * layout.analogue + 1:
         raise BadAnswer(
             f"{shown(answer)} has {len(parts)} fields where the layout has {2 * layout.analogue + 1}: compare it with "
@@ -121,7 +121,7 @@ def _number(part: str) -> float:
     try:
         value = float(part)
     except ValueError:
-        raise BadAnswer(f"{part!r} is no number") from None
+        raise BadAnswer(f"{part!r} is not a number") from None
     if not isfinite(value) or "_" in part:
         raise BadAnswer(f"{part!r} is not a finite number")
     return value

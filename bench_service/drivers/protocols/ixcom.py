@@ -156,7 +156,7 @@ def parameter(found: Frame, number: int) -> bytes:
         raise BadAnswer(f"message 0x{found.message:02X} is not a parameter")
     which = int.from_bytes(found.payload[:2], "little")
     if which != number:
-        raise BadAnswer(f"parameter {which} came where {number} was asked for")
+        raise BadAnswer(f"parameter {which} came where {number} was requested")
     return found.payload[4:]
 
 

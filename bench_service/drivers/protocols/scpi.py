@@ -68,9 +68,9 @@ def text(answer: bytes) -> str:
     try:
         found = answer.decode("ascii").strip()
     except UnicodeDecodeError:
-        raise BadAnswer(f"{shown(answer)} is no text") from None
+        raise BadAnswer(f"{shown(answer)} is not text") from None
     if not found or not found.isprintable():
-        raise BadAnswer(f"{shown(answer)} is no text")
+        raise BadAnswer(f"{shown(answer)} is not text")
     return found
 
 
@@ -88,7 +88,7 @@ def value(answer: bytes) -> float:
     try:
         number_found = float(found)
     except ValueError:
-        raise BadAnswer(f"{found!r} is no number") from None
+        raise BadAnswer(f"{found!r} is not a number") from None
     if not isfinite(number_found) or abs(number_found) > 1e37 or "_" in found:
         raise BadAnswer(f"{found!r} is not a finite number")
     return number_found

@@ -100,7 +100,7 @@ def number_of(answer: bytes) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise BadAnswer(f"{text!r} is no number") from None
+        raise BadAnswer(f"{text!r} is not a number") from None
     if not isfinite(value) or "_" in text:
         raise BadAnswer(f"{text!r} is not a finite number")
     return value

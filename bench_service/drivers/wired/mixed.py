@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from procedures.bench.device import DeviceIdentity
 from procedures.bench.supply import SupplyLimits, SupplyReading
-from procedures.bench.turntable import TableReading
+from procedures.bench.turntable import EncoderTrace, TableReading
 from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
@@ -93,6 +93,9 @@ class TwinTurntable:
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         await self._real.command_sinusoid(sinusoid)
         await self._below.command_sinusoid(sinusoid)
+
+    def trace(self) -> EncoderTrace:
+        return self._real.trace()
 
     async def settle(self) -> None:
         await self._real.settle()

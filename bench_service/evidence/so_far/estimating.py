@@ -29,6 +29,7 @@ from procedures.core.imu_model import COEFFICIENT_NAMES, coefficient_unit
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Channel, Recording
 from procedures.core.unit import Unit
+from procedures.procedure import Context
 
 KEPT = 8
 """Number of recordings whose cells are kept."""
@@ -49,11 +50,11 @@ class Estimating:
     def text(self, job_id: str) -> str:
         """Work the estimates of a job out; the JSON of a `JobEstimates`."""
         job = self.read_job(job_id)
-        unit = context_of(job, self.stores.calibrations.several).unit
+        context = context_of(job, self.stores.calibrations.several)
         done = [self.stores.recordings.load(stored.info.id) for stored in self.stores.recordings.of_job(job_id)]
         latest = self.stores.recordings.so_far(job_id) or (done[-1] if done else None)
-        dwell = None if latest is None else self._dwell(latest, unit)
-        triads, reasons = self._triads(job, done, unit)
+        dwell = None if latest is None else self._dwell(latest, context.unit)
+        triads, reasons = self._triads(job, done, context)
         return JobEstimates(
             job=job_id, stations_done=len(done), dwell=dwell, coefficients=triads, not_estimated=reasons
         ).model_dump_json()
@@ -85,12 +86,13 @@ class Estimating:
             not_estimated=reasons,
         )
 
-    def _triads(self, job: Job, done: list[RecordingSoFar], unit: Unit) -> tuple[list[TriadEstimates], dict[str, str]]:
+    def _triads(
+        self, job: Job, done: list[RecordingSoFar], context: Context
+    ) -> tuple[list[TriadEstimates], dict[str, str]]:
         found: list[TriadEstimates] = []
         reasons: dict[str, str] = {}
         if len(done) < 2 or len(done) > MOST_STATIONS or any(not _at_rest(one) for one in done):
             return found, reasons
-        context = context_of(job, self.stores.calibrations.several)
         site = site_with(context.bench.site, *(job.parameters.get(name) for name in _SITE))
         declared = {**vars(context.bench.accuracy), **job.parameters}
         table = TableUncertainty(
@@ -101,7 +103,7 @@ class Estimating:
         for triad in TRIAD_NAMES:
             try:
                 means = station_means(done, triad)
-                estimates = coefficients_so_far(means, site, unit.triad(triad), table)
+                estimates = coefficients_so_far(means, site, context.unit.triad(triad), table)
             except (DomainError, np.linalg.LinAlgError) as error:
                 reasons[triad] = str(error)
                 continue
@@ -114,7 +116,13 @@ _INERTIAL = frozenset(name for names in TRIADS.values() for name in names)
 
 def _at_rest(recording: Recording) -> bool:
     station = recording.info.station
-    return station is not None and station.angles is not None and station.turn is None and station.profile is None
+    return (
+        station is not None
+        and station.angles is not None
+        and station.turn is None
+        and station.sinusoid is None
+        and station.profile is None
+    )
 
 
 def _noise_of(unit: Unit, channel: Channel) -> NoiseCoefficients | None:

@@ -6,7 +6,7 @@ from bench_service.formats.clock.column import ClockColumn
 from bench_service.formats.clock.pattern import Pattern
 from bench_service.formats.description import SECONDS, ImportDescription
 from procedures.core.errors import BadParameter
-from procedures.core.recording import Quantity
+from procedures.core.recording import AROUND
 
 CRYSTAL = 1e-4
 """Largest relative error of an ordinary quartz's rate; beyond it a doubt is reported."""
@@ -46,7 +46,7 @@ def doubts(
                 f"is used; its clock allows {100.0 * allowed:.2g} %"
             )
     found += _name_doubts(rate_hz, column, description, column_name)
-    inertial = any(c.channel().quantity is not Quantity.TEMPERATURE for c in description.channels)
+    inertial = any(c.channel().quantity not in AROUND for c in description.channels)
     if inertial and declared is None and not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         found.append(
             f"{rate_hz:.6g} Hz is an unlikely rate of an inertial unit: is the unit of time right?"

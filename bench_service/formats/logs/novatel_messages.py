@@ -98,7 +98,7 @@ class Rows:
             raise UnreadableFile(
                 self._name,
                 f"the {self._key}A at byte {at} has {len(values)} fields, {len(_RECORDS[self._key])} are known, or one "
-                "of them is no number",
+                "of them is not a number",
             ) from error
 
     def _close_binary(self) -> None:

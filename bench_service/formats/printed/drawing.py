@@ -37,6 +37,7 @@ def _drawn(figure: Figure) -> str:
     from matplotlib import rc_context
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
+    from matplotlib.ticker import MaxNLocator
 
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": SALT, "font.size": 9, "axes.formatter.useoffset": False}):
         canvas = Canvas(figsize=SIZE_IN)
@@ -51,8 +52,9 @@ def _drawn(figure: Figure) -> str:
             _logarithmic(axes, "x", [v for s in figure.series for v in s.x])
         if figure.y_log:
             _logarithmic(axes, "y", [v for s in figure.series for v in (*s.y, *s.upper)])
-        if not figure.x_log and all(float(v).is_integer() for s in figure.series for v in s.x):
-            axes.xaxis.get_major_locator().set_params(integer=True)
+        marked = [v for s in figure.series if s.style in ("points", "line_points") for v in s.x]
+        if marked and not figure.x_log and all(float(v).is_integer() for v in marked):  # numbers of stations, results
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.grid(visible=True, linewidth=0.4, alpha=0.7)
         if len(figure.series) > 1:
             axes.legend(fontsize=8, framealpha=0.8)

@@ -16,7 +16,7 @@ from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import TRIADS, NominalScale, RawArray
 
-IN_NAMES = {"rad/s": "rad_per_s", "m/s^2": "m_per_s2", "degC": "degC", "count": "count"}
+IN_NAMES = {"rad/s": "rad_per_s", "m/s^2": "m_per_s2", "degC": "degC", "rad": "rad", "s": "s", "count": "count"}
 """Unit -> its form in a column's name, which every tool takes as a name."""
 LARGEST_FACTOR = 1_000_000
 

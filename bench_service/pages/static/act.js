@@ -6,13 +6,13 @@ import { t } from "./words.js";
 let dialogs = 0;
 
 /** Asks once: gives {by, reason} or null where the person does not want it after all. */
-export function confirmed({ title, lost, verb, reason = null, by = false }) {
+export function confirmed({ title, lost, verb, reason = null, by = false, kind = "danger" }) {
   return new Promise((settle) => {
     const id = `dialog-${++dialogs}`;
     const name = by && h("label", {}, t("Your name"), h("input", { name: "by", required: true, maxlength: 200, autocomplete: "name", value: me() }));
     const why = reason && h("label", {}, reason.label, h("input", { name: reason.name || "reason", maxlength: 500, required: reason.required, placeholder: reason.hint, type: reason.secret ? "password" : "text", autocomplete: reason.secret ? "new-password" : "off" }));
     const form = h("form", { method: "dialog" }, h("h2", { id }, title), lost && h("p", {}, lost), name, why,
-      h("div", { class: "verbs" }, h("button", { type: "submit", class: "danger" }, verb), h("button", { type: "button", class: "quiet", onclick: () => box.close() }, t("Back"))));
+      h("div", { class: "verbs" }, h("button", { type: "submit", class: kind }, verb), h("button", { type: "button", class: "quiet", onclick: () => box.close() }, t("Back"))));
     const box = h("dialog", { "aria-labelledby": id }, form);
     let given = null;
     form.addEventListener("submit", (event) => {
@@ -72,8 +72,8 @@ export function wire(within = document) {
     if (name && !name.value) name.value = me();
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
-      const { ask: title, lost, verb: label, reason, reasonName } = form.dataset;
-      const given = title ? await confirmed({ title, lost, verb: label, by: "by" in form.dataset, reason: reason ? { label: reason, name: reasonName } : null }) : {};
+      const { ask: title, lost, verb: label, reason, reasonName, kind } = form.dataset;
+      const given = title ? await confirmed({ title, lost, verb: label, kind, by: "by" in form.dataset, reason: reason ? { label: reason, name: reasonName } : null }) : {};
       if (given === null) return;
       const sent = { ...documentOf(form), ...given };
       if (sent.by) iAm(sent.by);

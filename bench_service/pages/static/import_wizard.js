@@ -98,7 +98,7 @@ async function bring(event) {
   event.preventDefault();
   const made = await busy(wizard.querySelector("button.go"), wizard.querySelector("output"), () => {
     let description;
-    try { description = JSON.parse(at("description").value); } catch (error) { throw new Error(`${t("The description is no JSON:")} ${error.message}`); }
+    try { description = JSON.parse(at("description").value); } catch (error) { throw new Error(`${t("The description is not JSON:")} ${error.message}`); }
     if (!byHand) description = described();
     const sent = new FormData();
     for (const file of files()) sent.append("files", file, file.name);

@@ -1,7 +1,7 @@
 // Calibrations of a unit side by side: differences, and differences over their uncertainty.
 import { ask, part, read } from "./api.js";
 import { busy } from "./act.js";
-import { fill, h, number, shownIn } from "./dom.js";
+import { fill, h, moment, number, shownIn } from "./dom.js";
 import { t } from "./words.js";
 
 const form = document.getElementById("compare");
@@ -17,6 +17,7 @@ function differences(a, b) {
 }
 
 if (form) {
+  for (const option of form.querySelectorAll("option[data-at]")) option.textContent = `${option.dataset.name} ${moment(option.dataset.at).textContent}`;
   const output = form.querySelector("output");
   form.addEventListener("submit", async (event) => {
     event.preventDefault();

@@ -67,7 +67,7 @@ def wanted_by_holds(session: Session, recording_id: str | None = None) -> frozen
 
 
 def wanted_by_analyses(session: Session, recording_id: str | None = None) -> frozenset[str]:
-    """Recordings that a task wants which waits or runs, or the one that is asked for."""
+    """Recordings that a waiting or running task needs, of all recordings or of one."""
     query = (
         select(TaskRecordingRow.recording_id)
         .join(TaskRow, (TaskRow.batch_id == TaskRecordingRow.batch_id) & (TaskRow.number == TaskRecordingRow.number))

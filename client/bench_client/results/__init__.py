@@ -5,6 +5,7 @@ from typing import Any
 from bench_client.results.allan_deviation import AllanDeviationResult
 from bench_client.results.calibration_12_orientations import Calibration12OrientationsResult
 from bench_client.results.converter_bench import ConverterBenchResult
+from bench_client.results.dynamic_response import DynamicResponseResult
 from bench_client.results.entered_thermal_correction import EnteredThermalCorrectionResult
 from bench_client.results.error_growth import ErrorGrowthResult
 from bench_client.results.ferraris_calibration import FerrarisCalibrationResult
@@ -29,6 +30,7 @@ from bench_client.results.scale_factor_whole_turns import ScaleFactorWholeTurnsR
 from bench_client.results.static_run import StaticRunResult
 from bench_client.results.table_program import TableProgramResult
 from bench_client.results.temperature_dependence import TemperatureDependenceResult
+from bench_client.results.thermal_correction_of_recordings import ThermalCorrectionOfRecordingsResult
 from bench_client.results.thermal_cycle import ThermalCycleResult
 from bench_client.results.thermometer_calibration import ThermometerCalibrationResult
 from bench_client.results.verification_9_orientations import Verification9OrientationsResult
@@ -36,6 +38,7 @@ from bench_client.results.verification_9_orientations import Verification9Orient
 Result = (
     Calibration12OrientationsResult
     | ConverterBenchResult
+    | DynamicResponseResult
     | FerrarisCalibrationResult
     | InitialAlignmentResult
     | MultiPositionCalibrationResult
@@ -63,12 +66,14 @@ Result = (
     | RunToRunResult
     | ScalarCalibrationResult
     | TemperatureDependenceResult
+    | ThermalCorrectionOfRecordingsResult
     | OtherResult
 )
 """A result; `isinstance` or `match` says which, and then its `document` has fields of its own."""
 CLASSES: dict[str, type[ResultHead]] = {
     "calibration_12_orientations": Calibration12OrientationsResult,
     "converter_bench": ConverterBenchResult,
+    "dynamic_response": DynamicResponseResult,
     "ferraris_calibration": FerrarisCalibrationResult,
     "initial_alignment": InitialAlignmentResult,
     "multi_position_calibration": MultiPositionCalibrationResult,
@@ -96,6 +101,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "run_to_run": RunToRunResult,
     "scalar_calibration": ScalarCalibrationResult,
     "temperature_dependence": TemperatureDependenceResult,
+    "thermal_correction_of_recordings": ThermalCorrectionOfRecordingsResult,
 }
 
 

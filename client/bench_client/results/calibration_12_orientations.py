@@ -3,28 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Form, Statement, TriadSummary, Verdict
-
-
-class ThermalShare(Part):
-    """Effect of the thermal correction on a calibration, JSON-ready."""
-
-    form: Form
-    """Form of the thermal correction"""
-    regime: str
-    """Regime assumed by the form ``switched``: "static"; empty for the other forms, which need none."""
-    case_c: tuple[float, ...]
-    """Case temperature at each station [°C]"""
-    converter_c: tuple[float, ...]
-    """Temperature of the unit's signal converter [°C]"""
-    change_m_s2: tuple[tuple[float, ...], ...]
-    """Correction added to the outputs x, y, z of each station [m/s²]"""
-    from_correction: dict[str, float]
-    """Standard uncertainty that the correction's coefficients leave in each calibration coefficient; it is part of
-    theirs.
-    """
-    from_sensors: dict[str, float]
-    """Standard uncertainty due to the temperature sensors' noise."""
+from bench_client.results.shared import Check, Statement, ThermalShare, TriadSummary, Verdict
 
 
 class DwellEnded(Part):

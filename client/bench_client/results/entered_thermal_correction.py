@@ -3,8 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, Verdict
-from bench_client.results.shared_by_two import ThermalCorrection
+from bench_client.results.shared import Check, Statement, ThermalCorrection, Verdict
 
 
 class EnteredThermalCorrectionDocument(Part):

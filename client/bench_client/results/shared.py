@@ -272,6 +272,27 @@ class TriadSummary(Part):
 Form = Literal["both", "switched", "single"]
 
 
+class ThermalShare(Part):
+    """Effect of the thermal correction on a calibration, JSON-ready."""
+
+    form: Form
+    """Form of the thermal correction"""
+    regime: str
+    """Regime assumed by the form ``switched``: "static"; empty for the other forms, which need none."""
+    case_c: tuple[float, ...]
+    """Case temperature at each station [°C]"""
+    converter_c: tuple[float, ...]
+    """Temperature of the unit's signal converter [°C]"""
+    change_m_s2: tuple[tuple[float, ...], ...]
+    """Correction added to the outputs x, y, z of each station [m/s²]"""
+    from_correction: dict[str, float]
+    """Standard uncertainty that the correction's coefficients leave in each calibration coefficient; it is part of
+    theirs.
+    """
+    from_sensors: dict[str, float]
+    """Standard uncertainty due to the temperature sensors' noise."""
+
+
 class Normalised(Part):
     """Normalised function: ``value_0·F(t)`` with F(t_0) = 1 if `relative`, else ``value_0 + F(t)`` with F(t_0) =
     0.
@@ -371,6 +392,38 @@ class Density(Part):
     """Ends of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
 
 
+class AxisCorrection(Part):
+    """Thesis 4.1 of one accelerometer. α in 1/°C (α2, α4) and 1/°C², β in m/s² a °C (β1, β3) and a °C²."""
+
+    scale: float
+    """K0, m/s² a m/s² of nominal output."""
+    bias_m_s2: float
+    """Offset B0, which is *added*: minus the output at zero input, at the reference temperatures [m/s²]"""
+    alpha: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    """Temperature coefficients α1 … α4 of the scale factor (thesis 4.1)"""
+    beta: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    """Temperature coefficients β1 … β4 of the bias (thesis 4.1)"""
+    case_reference_c: float = 20.0
+    """Reading of the case (gyro) sensor at the standard calibration [°C]"""
+    converter_reference_c: float = 20.0
+    """Reading of the converter's sensor at which the correction does nothing [°C]"""
+    form: Form = "both"
+    """Form of the thermal correction"""
+    dynamic_offset: tuple[float, ...] = (0.0, 0.0)
+    """Change of K0 and B0 in the dynamic regime, for the form ``switched`` alone."""
+    covariance: tuple[tuple[float, ...], ...] = ()
+    """Covariance of α1 … α4, β1 … β4, (8, 8); rows of what the form does not use are zero. Empty: not known."""
+
+
+class TemperatureRange(Part):
+    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
+
+    case_c: tuple[float, ...]
+    """Temperature of the unit's case [°C]"""
+    converter_c: tuple[float, ...]
+    """Temperature of the unit's signal converter [°C]"""
+
+
 class SensorCorrection(Part):
     """Correction of one temperature sensor about the set's reference."""
 
@@ -395,3 +448,25 @@ class ThermometerCorrection(Part):
     """Covariance of offset and slope of the first sensor, of the second, …, (2m, 2m)."""
     fitted_range_c: tuple[float, ...]
     """Lowest and highest temperature of the soaks; beyond them the lines are extrapolated [°C]"""
+
+
+class ThermalCorrection(Part):
+    """Thesis 4.1 of a triad, x, y, z."""
+
+    triad: str
+    """Triad: gyro or accelerometer"""
+    axes: tuple[AxisCorrection, ...]
+    """Correction of each axis, x, y, z"""
+    first_stage: tuple[ConverterModel, ...] | None = None
+    """The converter's models that were taken out of the outputs before the fit (`core.converter.at_reference`),
+    and so must be wherever the correction is used; None: it is for outputs as they are. The reference of the
+    whole is then these models' for the converter's own drift, and the axes' for the rest: best the same.
+    """
+    fitted_range: TemperatureRange | None = None
+    """Temperature range of the fit; beyond it the correction extrapolates. None: not known (older versions)."""
+    thermometers: ThermometerCorrection | None = None
+    """Correction of the sensors that was taken out of their readings before the fit, and so must be wherever the
+    correction is used: its temperatures are then temperatures. None: they are readings.
+    """
+    static_sensors: Literal["case", "gyros"] = "case"
+    """Sensor of the static terms: the case's for all axes, or the thermometer of each axis' own gyro (thesis 4.1)."""

@@ -3,8 +3,8 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, Verdict
-from bench_client.results.shared_by_two import AxisCorrection, GyroThermalCorrection, ThermalCorrection
+from bench_client.results.shared import AxisCorrection, Check, Statement, ThermalCorrection, Verdict
+from bench_client.results.shared_by_two import GyroThermalCorrection
 
 
 class LegEvidence(Part):

@@ -128,28 +128,29 @@ def budgets(fit: TriadFit, parts: Sequence[Part], table: TableErrors) -> tuple[B
     gain = fit.estimator.gain
     through = [np.sqrt(np.maximum(np.einsum("kci,cij,kcj->k", gain, p.covariance, gain), 0.0)) for p in parts]
     of_table = {s: fit.table.standard_uncertainty(s) for s in TABLE if s in fit.table.source}
-    values = {s: _declared(table, s) for s in of_table}
+    values = {s: declared_value(table, s) for s in of_table}
     found: list[Budget] = []
     for i, name in enumerate(COEFFICIENT_NAMES):
         channel = i // 4
         rows = [
-            _row(p.source, p.value[channel], p.unit, float(c[i]), p.distribution, p.divisor, p.degrees_of_freedom)
+            row_of(p.source, p.value[channel], p.unit, float(c[i]), p.distribution, p.divisor, p.degrees_of_freedom)
             for p, c in zip(parts, through, strict=True)
         ]
-        rows += [_row(s, *values[s], float(c[i])) for s, c in of_table.items() if values[s][0] > 0.0]
+        rows += [row_of(s, *values[s], float(c[i])) for s, c in of_table.items() if values[s][0] > 0.0]
         unit = coefficient_unit(name, fit.output_unit, fit.input_unit)
-        found.append(_budget(CoefficientName(fit.triad, name), unit, [r for r in rows if r.value > 0.0]))
+        found.append(budget_of(CoefficientName(fit.triad, name), unit, [r for r in rows if r.value > 0.0]))
     return tuple(found)
 
 
-def _budget(name: CoefficientName, unit: str, rows: Sequence[BudgetRow]) -> Budget:
+def budget_of(name: CoefficientName, unit: str, rows: Sequence[BudgetRow]) -> Budget:
+    """The budget of one coefficient by its rows: root sum of squares, effective degrees of freedom, coverage."""
     total = float(np.sqrt(sum(r.contribution**2 for r in rows)))
     freedom = combined_freedom([(r.contribution, r.degrees_of_freedom) for r in rows]) if total > 0.0 else None
     factor = coverage_factor(COVERAGE, freedom)
     return Budget(name, unit, tuple(rows), total, freedom, factor, factor * total)
 
 
-def _row(
+def row_of(
     source: str,
     value: float,
     unit: str,
@@ -158,11 +159,12 @@ def _row(
     divisor: float = 1.0,
     freedom: float | None = None,
 ) -> BudgetRow:
+    """One row, with the sensitivity that its contribution means."""
     sensitivity = contribution * divisor / value if value > 0.0 else 0.0
     return BudgetRow(source, value, unit, distribution, divisor, sensitivity, contribution, freedom)
 
 
-def _declared(table: TableErrors, source: str) -> tuple[float, str]:
+def declared_value(table: TableErrors, source: str) -> tuple[float, str]:
     """Declared standard deviation of a source, and its unit."""
     if source == "mounting":
         return table.seat_sd_rad / units.ARCSEC, "arcsec"

@@ -11,6 +11,7 @@ from procedures.analysis.calibration.left_out import left_out_magnitudes
 from procedures.analysis.calibration.multiposition import TriadFit, fit_triad
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.calibration.reference_temperature import (
+    AtReference,
     ThermalShare,
     bring_to_reference,
     gyros_at_reference,
@@ -37,7 +38,7 @@ from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature.gyros import GyroThermalCorrection
 from procedures.core.thermal_correction import ThermalCorrection
-from procedures.core.unit import TriadRecord
+from procedures.core.unit import TriadRecord, Unit
 
 
 def analyse_triad(
@@ -161,8 +162,21 @@ def analyse_accelerometers(
     return summary, fit, thermal_share(brought, correction, fit), thermal_warnings(brought, correction)
 
 
+def brought_by_unit(
+    recordings: Sequence[Recording], means: StationMeans, unit: Unit, lag_s: tuple[float, float]
+) -> tuple[StationMeans, dict[str, Array], AtReference | None]:
+    """Station means at the references of the unit's corrections, and their covariances from these, by cause."""
+    if means.triad == "accelerometer" and unit.thermal_correction is not None:
+        warm = bring_to_reference(recordings, means, unit.thermal_correction, lag_s)
+        return warm.means, {"thermal correction": warm.of_correction, "thermometers": warm.of_sensors}, warm
+    if means.triad == "gyro" and unit.gyro_correction is not None:
+        own, covariance = gyros_at_reference(recordings, means, unit.gyro_correction)
+        return own, {"thermal correction": covariance}, None
+    return means, {}, None
+
+
 def suspected(found: Sequence[tuple[TriadSummary, TriadFit]]) -> tuple[TriadSummary, ...]:
-    """The summaries of triads at the same stations, each with the flaw that its residuals look like beside the others'.
+    """The summaries of triads at the same stations, each with the flaw that its residuals and the others' point to.
 
     A flaw of the table that one triad's residuals look like is not named where another triad's contradict it.
     """

@@ -5,7 +5,7 @@ from procedures.analysis.fitness.edges import RAILS, Edge
 from procedures.analysis.fitness.findings import Finding, FitnessSettings, Kind, Severity
 from procedures.analysis.fitness.wording import Wording
 from procedures.analysis.fitness.wraps import Wrap
-from procedures.core.recording import INCREMENTS, Channel, Quantity
+from procedures.core.recording import AROUND, INCREMENTS, Channel
 
 
 def length(name: str, seen: int, announced: int | None, settings: FitnessSettings) -> list[Finding]:
@@ -42,13 +42,13 @@ def is_constant(edges: tuple[Edge, Edge], missing_count: int, seen: int) -> bool
 def constant(
     channel: Channel, value: float, is_integer: bool, words: Wording, settings: FitnessSettings
 ) -> list[Finding]:
-    """Finding on a channel of one value; a temperature may be constant, as may a counter among other stations."""
+    """Finding on a channel of one value, which what is around the unit may have, as a counter among other stations."""
     railed = is_integer and value in RAILS
     rail = ", the end of its range" if railed else ""
     begin = f"channel {channel.name}: the channel is constant, it reads {value:.9g}{rail}"
     told = f"{begin} throughout all {words.seen} samples; a live channel shows noise"
     counter = is_integer and channel.quantity in INCREMENTS
-    if not railed and (channel.quantity is Quantity.TEMPERATURE or (settings.beside_others and counter)):
+    if not railed and (channel.quantity in AROUND or (settings.beside_others and counter)):
         return []
     silent = (counter and settings.counters_may_rest) or settings.beside_others
     severity = Severity.WARN if silent and not railed else Severity.REFUSE

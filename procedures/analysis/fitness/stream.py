@@ -21,7 +21,7 @@ from procedures.analysis.fitness.wording import Wording
 from procedures.analysis.fitness.wraps import Wraps
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
-from procedures.core.recording import INCREMENTS, TRIADS, Channel, Quantity, RawArray, Recording
+from procedures.core.recording import AROUND, INCREMENTS, TRIADS, Channel, RawArray, Recording
 
 _SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
 
@@ -78,7 +78,7 @@ class FitnessStream:
             if self._settings.at_rest:
                 self._of_course(found, words)
         told = unlikely_rate(self._rate_hz)
-        if told is not None and any(c.quantity is not Quantity.TEMPERATURE for c in self._channels):
+        if told is not None and any(c.quantity not in AROUND for c in self._channels):
             for findings in found:
                 findings.append(Finding(Kind.UNLIKELY_RATE, Severity.WARN, told, of_row=True))
         return tuple(ChannelFitness(c.name, tuple(f)) for c, f in zip(self._channels, found, strict=True))
@@ -239,7 +239,7 @@ class FitnessStream:
             count = int(jumps.outlier_count[c])
             mended = self._settings.mends_outliers and self._few(c)
             found[c] += time_flaws.outliers(channel, jumps.outliers[c], count, mended, words)
-            if channel.quantity is not Quantity.TEMPERATURE:
+            if channel.quantity not in AROUND:
                 found[c] += time_flaws.steps(channel, jumps.steps[c], level[c], cells.size, words)
                 found[c] += time_flaws.noise_changes(channel, noise[c], cells.size * cells.group, words)
 

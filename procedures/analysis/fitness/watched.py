@@ -36,6 +36,8 @@ class Inspection:
 
     def matters(self, found: ChannelFitness, channel: Channel) -> ChannelFitness | None:
         """The findings of a channel as far as they matter to the analysis."""
+        if channel.quantity in (Quantity.ANGLE, Quantity.TIME):
+            return None
         if channel.quantity is not Quantity.TEMPERATURE:
             return found if self.channels is None or channel.name in self.channels else None
         if self.temperatures:
@@ -47,7 +49,7 @@ class Inspection:
         """Requirements on one recording: a station may turn on purpose, or feed a current in place of gravity."""
         if station is None:
             return self.settings
-        turns, fed = station.turn is not None, station.current_ma is not None
+        turns, fed = station.turn is not None or station.sinusoid is not None, station.current_ma is not None
         still, weighs = self.settings.at_rest and not turns, self.settings.reads_gravity and not fed
         return replace(self.settings, at_rest=still, reads_gravity=weighs)
 

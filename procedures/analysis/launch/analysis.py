@@ -22,7 +22,7 @@ from procedures.analysis.noise_fit.powers import FastPowers, Powers
 from procedures.core import spread
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.recording import Quantity, RawArray, Recording, RecordingInfo
+from procedures.core.recording import AROUND, RawArray, Recording, RecordingInfo
 
 INSPECTION = Inspection(FitnessSettings())
 """Inspection settings of a launch: the unit is at rest throughout."""
@@ -71,7 +71,7 @@ def analyse_launches(
 
 
 def _names(info: RecordingInfo) -> tuple[str, ...]:
-    names = tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
+    names = tuple(c.name for c in info.channels if c.quantity not in AROUND)
     if not names:
         raise UnfitRecording(f"recording {info.id} has no channel whose noise could be analysed")
     return names

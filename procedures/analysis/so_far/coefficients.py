@@ -9,10 +9,10 @@ from procedures.analysis.calibration.reference import INPUT_UNITS, reference_vec
 from procedures.analysis.calibration.station_means import StationMeans
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
+from procedures.analysis.calibration.triad_analysis import station_angles
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.site import Site
-from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord
 
 BIAS_PRIOR = {"gyro": np.radians(1.0), "accelerometer": 1.0}
@@ -54,9 +54,7 @@ def coefficients_so_far(
     """
     if means.output_unit != INPUT_UNITS[means.triad]:
         raise UnfitRecording(f"the {means.triad} is in {means.output_unit}: its coefficients are known after the last")
-    angles = [one for one in means.angles if isinstance(one, TableAngles)]
-    if len(angles) != len(means.angles):
-        raise UnfitRecording("a station has no angles: its input is not known")
+    angles = station_angles(means)
     covariance = triad_covariance(record, means.windows)
     known = covariance is not None
     if covariance is None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from procedures.analysis.allan.deviation import deviation
 from procedures.analysis.recursive_bias.kalman import RecursiveBias
-from procedures.analysis.recursive_bias.window_noise import contiguous_covariance, observed_covariance
+from procedures.analysis.recursive_bias.window_noise import contiguous_covariance, known_noise, observed_covariance
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.noise import NoiseCoefficients
@@ -54,10 +54,10 @@ def bias_so_far(means: Array, cell_s: float, noise: NoiseCoefficients | None) ->
     own (`observed_covariance`). Raises `UnfitRecording` for fewer than `WINDOWS_MIN` cells and for a constant channel.
     """
     windows, length_s = _windows(means, cell_s)
-    known = noise is not None and noise.random_walk + noise.quantization + noise.bias_instability > 0.0
-    if known and noise is not None:
+    known = known_noise(noise)
+    if known is not None:
         edges = np.linspace(0.0, length_s * len(windows), len(windows) + 1)
-        covariance = contiguous_covariance(noise, np.column_stack([edges[:-1], edges[1:]]))
+        covariance = contiguous_covariance(known, np.column_stack([edges[:-1], edges[1:]]))
     else:
         covariance = observed_covariance(windows)
     bias = RecursiveBias(covariance)
@@ -71,7 +71,7 @@ def bias_so_far(means: Array, cell_s: float, noise: NoiseCoefficients | None) ->
         course=course[chosen],
         course_uncertainty=np.sqrt(bias.variances[chosen]),
         innovations_rms=float(np.sqrt(np.mean(innovations**2))),
-        noise_known=known,
+        noise_known=known is not None,
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from procedures.analysis.calibration.station_means import StationMeans, station_means
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.turns.budget import turn_budgets, turn_parts
 from procedures.analysis.turns.fit import TurnEstimator, Turning, fitted, turn_estimator, turn_flaws, turning
 from procedures.analysis.turns.summary import WholeTurns, require_turns, whole_turns
 from procedures.core import units
@@ -39,15 +40,17 @@ END_REST_S = 2.0
 """Rest at the end of a recording of turns [s]."""
 
 
-def face_stations(rest_s: float, turns: int, rate_deg_s: float, ramp_s: float, settle_s: float) -> tuple[Station, ...]:
-    """Each face in turn: at rest, then whole turns there and back, each recording ending at rest for `END_REST_S`."""
+def face_stations(
+    rest_s: float, turns: int, rate_deg_s: float, ramp_s: float, settle_s: float, end_rest_s: float = END_REST_S
+) -> tuple[Station, ...]:
+    """Each face in turn: at rest, then whole turns there and back, each recording ending at rest for `end_rest_s`."""
     made: list[Station] = []
     for face, angles in FACES.items():
         made.append(Station(len(made), f"{face} at rest", angles, None, settle_s, rest_s))
         for sign in (1, -1):
             turn = Turn("outer", sign * turns, rate_deg_s, ramp_s)
             label = f"{face} {sign * rate_deg_s:+g} deg/s, {turn.turns:+d} turns"
-            made.append(Station(len(made), label, angles, None, settle_s, turn.duration_s + END_REST_S, turn=turn))
+            made.append(Station(len(made), label, angles, None, settle_s, turn.duration_s + end_rest_s, turn=turn))
     return tuple(made)
 
 
@@ -62,7 +65,8 @@ def rests_and_turns(stations: Sequence[Station], seconds: Array, site: Site) -> 
     n = len(stations)
     angle, rate, moments = np.zeros(n), np.zeros(n), np.zeros((n, 3))
     angle[turns], rate[turns], moments[turns] = moving.angle_rad, moving.rate_rad_s, moving.moments
-    return Turning(np.asarray(seconds, dtype=np.float64), axis, angle, rate, earth, moments, angles)
+    rates = earth_rate_b(list(angles), site)
+    return Turning(np.asarray(seconds, dtype=np.float64), axis, angle, rate, earth, moments, angles, rates)
 
 
 def ferraris_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableErrors:
@@ -101,7 +105,12 @@ def analyse_ferraris(
     first = ferraris_estimator(motion, None, uncertainty, np.eye(3))
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]
     fit = fitted(ferraris_estimator(motion, noise, uncertainty, matrix), outputs, noise is not None)
-    return whole_turns(fit, (), motion, outputs, np.flatnonzero(turns).tolist(), noise is not None)
+    found = whole_turns(fit, (), motion, outputs, np.flatnonzero(turns).tolist(), noise is not None)
+    parts, names = (
+        turn_parts(record if noise is not None else None, means.windows),
+        [c.name for c in found.coefficients],
+    )
+    return replace(found, budgets=turn_budgets(fit, names, parts, ferraris_flaws(motion, uncertainty)))
 
 
 def faces_of(recordings: Sequence[Recording]) -> list[Station]:
@@ -130,7 +139,7 @@ def rest_means(recordings: Sequence[Recording]) -> StationMeans:
 def only(motion: Turning, which: Array) -> Turning:
     """The motion of some of the stations."""
     angles = tuple(a for a, taken in zip(motion.angles, which, strict=True) if taken)
-    fields = ("seconds", "axis_b", "angle_rad", "rate_rad_s", "earth_rad", "moments")
+    fields = ("seconds", "axis_b", "angle_rad", "rate_rad_s", "earth_rad", "moments", "earth_rate_b")
     return replace(motion, **{name: getattr(motion, name)[which] for name in fields}, angles=angles)
 
 

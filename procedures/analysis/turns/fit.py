@@ -14,7 +14,7 @@ declared flaws.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, pi
 from typing import Literal
 
@@ -66,6 +66,8 @@ class Turning:
     """``∫|ω| dt``, ``∫ω² dt``, ``∫ω³ dt`` of the table's rate [rad, rad²/s, rad³/s²], (n, 3)."""
     angles: tuple[TableAngles, ...]
     """Table angles at the beginning and the end of each recording."""
+    earth_rate_b: Array
+    """Earth's rate in the unit's axes at these angles [rad/s], (n, 3)."""
 
     @property
     def turned_b(self) -> Array:
@@ -104,6 +106,7 @@ def turning(stations: Sequence[Station], seconds: Array, site: Site) -> Turning:
         along * np.asarray(seconds)[:, None] + (earth - along) * cosine[:, None],
         np.column_stack([np.abs(angle), square, cube]),
         angles,
+        earth,
     )
 
 
@@ -129,15 +132,23 @@ def _cosine_integral(turn: Turn, seconds: float) -> float:
 
 
 def turn_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableErrors:
-    """Effect of the table's flaws on the turned angle: the axis' direction in the unit, and the angles at the ends.
+    """Effect of the table's flaws on the turned angle and on the Earth's turn meanwhile, ∂v/∂p (n, 3, P).
 
-    Columns as `table_errors` has them. Level and azimuth move the axis and the unit together and do not enter. The
-    outer axis' pointing counts twice, at the beginning and at the end of the turns, independently: √2 along the axis.
+    Columns as `table_errors` has them. The axis' direction in the unit and the angles at the ends change the turned
+    angle; the outer axis' pointing counts twice, at the beginning and at the end, independently: √2 along the axis.
+    Level and azimuth move axis and unit together and change the Earth's turn E alone: a heading ψ turns its part across
+    the axis, ``δE = δψ·(E × e)``, and a tilt about a horizontal h its part along it, ``δE = δε·T·e·(e·(Ω × h))``. What
+    the tilt changes across the axis is left out: it comes and goes with every turn.
     """
-    u = TableUncertainty(uncertainty.orthogonality_sd_arcsec, uncertainty.pointing_sd_arcsec)
+    u = replace(uncertainty, gravity_relative_sd=0.0, mounting_sd_arcsec=0.0)
     flaws = table_errors(motion.angles, motion.turned_b, u, of_gravity=False)
-    for i, axis in enumerate(motion.axis_b):
+    for i, (angles, axis) in enumerate(zip(motion.angles, motion.axis_b, strict=True)):
         flaws.sensitivity[i, :, 6 + 3 * i] = np.sqrt(2.0) * axis
+        across = table_rotation(angles).inv()
+        for column, level in ((2, across.apply([1.0, 0.0, 0.0])), (3, across.apply([0.0, 0.0, 1.0]))):
+            along = float(axis @ np.cross(motion.earth_rate_b[i], level))
+            flaws.sensitivity[i, :, column] = motion.seconds[i] * along * axis
+        flaws.sensitivity[i, :, 4] = np.cross(motion.earth_rad[i], axis)
     return flaws
 
 

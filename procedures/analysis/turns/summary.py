@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from procedures.analysis.calibration.budget import Budget
 from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.summary import Coefficient
 from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.own_axes import axes_answered, wrong_axes
-from procedures.analysis.turns.fit import Term, TurnFit, Turning, fit_turns, turning
+from procedures.analysis.turns.budget import turn_budgets, turn_parts
+from procedures.analysis.turns.fit import Term, TurnFit, Turning, fit_turns, turn_flaws, turning
 from procedures.analysis.turns.path import as_turned
 from procedures.analysis.turns.plan import coefficient_names
 from procedures.core import units
@@ -59,6 +61,8 @@ class WholeTurns:
     degrees_of_freedom: int
     p_value: float | None
     noise_known: bool
+    budgets: tuple[Budget, ...] = ()
+    """Uncertainty budget of each coefficient; empty in results of older versions."""
 
     def coefficient(self, name: str) -> Coefficient:
         """Look up a coefficient by its name without the triad: "K11", "asymmetry_x"."""
@@ -91,7 +95,9 @@ def analyse_turns(
     reference = reference_rate_deg_s * units.DEG
     fit = fit_turns(motion, outputs, terms, reference, noise, uncertainty)
     made = whole_turns(fit, terms, motion, outputs, range(len(outputs)), noise is not None)
-    return replace(made, reference_rate_deg_s=reference_rate_deg_s)
+    parts, names = turn_parts(record if noise is not None else None, means.windows), [c.name for c in made.coefficients]
+    of_each = turn_budgets(fit, names, parts, turn_flaws(motion, uncertainty))
+    return replace(made, reference_rate_deg_s=reference_rate_deg_s, budgets=of_each)
 
 
 def whole_turns(

@@ -45,7 +45,11 @@ class ThermometerCorrection:
         if not np.all(np.isfinite([*numbers, self.reference_c, *self.fitted_range_c])):
             raise BadParameter("sensors", numbers, "finite offsets, slopes, reference and range")
         if not all(abs(s.slope) < 0.5 for s in self.sensors):
-            raise BadParameter("slope", [s.slope for s in self.sensors], "within −0.5 … 0.5: else it is no thermometer")
+            raise BadParameter(
+                "slope",
+                [s.slope for s in self.sensors],
+                "within −0.5 … 0.5: other values are not those of a thermometer",
+            )
 
     def has(self, channel: str) -> bool:
         """Whether a channel's sensor was calibrated."""

@@ -80,7 +80,7 @@ def read_cycle(recording: Recording, up: int) -> CycleSeries:
     info = recording.info
     station = info.station
     if station is None or station.profile is None:
-        raise UnfitRecording(f"recording {info.id} is no run of a thermal cycle: its station has no profile")
+        raise UnfitRecording(f"recording {info.id} is not a run of a thermal cycle: its station has no profile")
     columns = {name: info.column(name) for name in CHANNELS}
     for name, wanted in RATE_UNITS.items():
         if (found := info.channels[columns[name]].rate_unit) != wanted:

@@ -1,0 +1,64 @@
+"""Uncertainty budget of each coefficient from whole turns: noise process by process, and each flaw of the table.
+
+A flaw p changes the integrated outputs by ``δy = K·∂v/∂p·δp`` with v the turned angle and the Earth's turn together
+(`turns.fit.turn_flaws`); the estimator's gain G carries both into the coefficients, ``c² = |G·δy|²``, and a noise
+process of covariance C of the means gives ``c² = diag(G·T·C·T·Gᵀ)``, T the lengths of the recordings. The contributions
+are those of the stated uncertainty: their root sum of squares is the total. Cross-coupling is no row of its own: it is
+the sensitivity by which the right angles reach a scale factor.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from procedures.analysis.calibration.budget import (
+    OBSERVED,
+    Budget,
+    Part,
+    budget_of,
+    declared_value,
+    noise_parts,
+    row_of,
+)
+from procedures.analysis.calibration.table_errors import TableErrors
+from procedures.analysis.turns.fit import UNKNOWN_NOISE_SD, TurnFit
+from procedures.core.arrays import Array
+from procedures.core.coefficient_name import CoefficientName
+from procedures.core.unit import TriadRecord
+
+
+def turn_parts(record: TriadRecord | None, windows: Array) -> list[Part]:
+    """Noise of the integrated outputs [rad] of recordings that last `windows` (n, 2), process by process."""
+    if record is None:
+        return []
+    seconds = windows[:, 1] - windows[:, 0]
+    size = np.outer(seconds, seconds)
+    return [replace(p, covariance=p.covariance * size) for p in noise_parts(record, windows, "rad/s")]
+
+
+def turn_budgets(
+    fit: TurnFit, names: Sequence[CoefficientName], parts: Sequence[Part], flaws: TableErrors
+) -> tuple[Budget, ...]:
+    """The budget of each coefficient, in the order of `names`; without `parts` the noise is that of the residuals."""
+    made = fit.estimator
+    gain = made.gain.reshape(len(names), 3, -1)
+    contributed = [np.sqrt(np.maximum(np.einsum("kci,cij,kcj->k", gain, p.covariance, gain), 0.0)) for p in parts]
+    sources = [s for s in dict.fromkeys(made.source) if np.any(made.of_source(s) > 0.0)]
+    of_table = {s: (declared_value(flaws, s), made.of_source(s)) for s in sources}
+    observed = np.sqrt(np.diagonal(fit.noise_covariance))
+    scale = float(np.sqrt(fit.chi_square / fit.degrees_of_freedom)) if fit.degrees_of_freedom else 1.0
+    per_channel = len(names) // 3
+    found: list[Budget] = []
+    for i, name in enumerate(names):
+        rows = [
+            row_of(p.source, p.value[i // per_channel], p.unit, float(c[i]), p.distribution, p.divisor)
+            for p, c in zip(parts, contributed, strict=True)
+        ]
+        if not parts:
+            freedom = float(max(1, fit.degrees_of_freedom))
+            rows.append(row_of(OBSERVED, scale * UNKNOWN_NOISE_SD, "rad", float(observed[i]), freedom=freedom))
+        rows += [row_of(s, *value, float(c[i])) for s, (value, c) in of_table.items()]
+        unit = "rad/s" if name.symbol.startswith("b_") else "1"
+        found.append(budget_of(name, unit, [r for r in rows if r.value > 0.0]))
+    return tuple(found)
