@@ -104,7 +104,7 @@ def _in_job(session: Session, job: ColumnElement[Any] | _Column, text: str) -> l
             named = JobLabelRow.name == name
             way = named if held else _in_column(session, JobLabelRow.value, text, named)
             pairs += [] if way is None else [way]
-    ways = [job.in_(select(JobLabelRow.job_id).where(or_(*pairs)))] if pairs else []
+    ways: list[ColumnElement[bool]] = [job.in_(select(JobLabelRow.job_id).where(or_(*pairs)))] if pairs else []
     number = job_number(text)
     return ways if number is None else [*ways, job.in_(select(JobRow.id).where(JobRow.number == number))]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +34,11 @@ def deviations(
     """
     count = len(samples)
     wanted = {statistic: checked_sizes(own, count, statistic) for statistic, own in sizes.items()}
-    given = {"increments": increments, "confidence": confidence}
     interval(np.ones(1), np.ones(1), confidence)
     summed = {s: own for s, own in wanted.items() if s != TIME or not _is_scaled(wanted)}
     if count <= WHOLE:
-        found = {s: deviation(samples, rate_hz, s, sizes=own, **given) for s, own in summed.items()}
+        alone = partial(deviation, samples, rate_hz, increments=increments, confidence=confidence)
+        found = {statistic: alone(statistic, sizes=own) for statistic, own in summed.items()}
     else:
         found = _together(samples, rate_hz, summed, increments, confidence)
     if TIME in wanted and TIME not in found:
@@ -81,6 +82,12 @@ def _together(
         try:
             found[statistic] = from_sums(statistic, rate_hz, count, one, integral, confidence)
         except Uncorrelatable:
-            given = {"increments": increments, "confidence": confidence}
-            found[statistic] = deviation(samples, rate_hz, statistic, sizes=wanted[statistic], **given)
+            found[statistic] = deviation(
+                samples,
+                rate_hz,
+                statistic,
+                sizes=wanted[statistic],
+                increments=increments,
+                confidence=confidence,
+            )
     return found
