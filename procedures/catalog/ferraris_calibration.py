@@ -31,6 +31,7 @@ from procedures.ferraris import FerrarisLimits, Result
 from procedures.multi_position import predicted
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.site_parameters import TableParameters, declared_table
+from procedures.turn_rests import require_rest, rest_with_demands
 
 ACCELERATION_SHARE = 0.9
 """Share of the outer axis' acceleration for ramps without a given length; the rest is for the servo."""
@@ -54,7 +55,7 @@ def resolve(params: Params, context: Context) -> Params:
     """Rest from the unit; ramps, site and table accuracy from the bench."""
     outer = context.bench.outer
     ramp_s = PEAK_ACCELERATION * params.rate_deg_s / (ACCELERATION_SHARE * outer.acceleration_deg_s2)
-    end_rest_s = END_REST_S + ceil(10.0 * context.bench.turn_extra_s) / 10.0
+    end_rest_s = rest_with_demands(END_REST_S, context.bench)
     own = {"rest_s": context.unit.averaging_time_s, "ramp_s": ceil(10.0 * ramp_s) / 10.0, "end_rest_s": end_rest_s}
     full = params.filled({**own, **declared_table(context)})
     full.require_sources(context, corrected=False)
@@ -76,9 +77,7 @@ def predict(params: Params, context: Context) -> Prediction:
     """Duration and the uncertainty of each coefficient of both triads. Raises `BadParameter`, `Undetermined`."""
     params = resolve(params, context)
     stations = schedule(params)
-    if (params.end_rest_s or 0.0) < context.bench.turn_extra_s:
-        allowed = f"at least {context.bench.turn_extra_s:.3g} s, which the table's demands take"
-        raise BadParameter("end_rest_s", params.end_rest_s, allowed)
+    require_rest("end_rest_s", params.end_rest_s, context.bench)
     for station in stations:
         if station.angles is not None and (found := context.bench.violations(station.angles, station.turn)):
             raise BadParameter("rate_deg_s", params.rate_deg_s, f"station {station.label}: {'; '.join(found)}")

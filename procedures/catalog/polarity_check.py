@@ -23,6 +23,7 @@ from procedures.core.recording import AXES, TRIADS, Recording, Station
 from procedures.core.report import Report, Table
 from procedures.core.turn import PEAK_ACCELERATION, Turn
 from procedures.procedure import Context, JudgedParameters, Outcome, Parameters, Prediction, Procedure
+from procedures.turn_rests import require_rest, rest_with_demands
 
 REST_S = 4.0
 """Rest at the end of a recording where the table's demands take no time [s]."""
@@ -60,7 +61,7 @@ class Result(Outcome):
 def resolve(params: Params, context: Context) -> Params:
     """Ramp from the outer axis' acceleration, rest from the table's demands: the last half of it is at rest."""
     ramp_s = PEAK_ACCELERATION * params.rate_deg_s / (ACCELERATION_SHARE * context.bench.outer.acceleration_deg_s2)
-    rest_s = REST_S + 2.0 * ceil(10.0 * context.bench.turn_extra_s) / 10.0
+    rest_s = rest_with_demands(REST_S, context.bench, turns=2)
     return params.filled({"ramp_s": ceil(10.0 * ramp_s) / 10.0, "rest_s": rest_s})
 
 
@@ -79,9 +80,7 @@ def predict(params: Params, context: Context) -> Prediction:
     """Duration. Raises `BadParameter` where the table cannot turn so."""
     params = resolve(params, context)
     stations = schedule(params)
-    if (params.rest_s or 0.0) < 2.0 * context.bench.turn_extra_s:
-        allowed = f"at least {2.0 * context.bench.turn_extra_s:.3g} s, twice what the table's demands take"
-        raise BadParameter("rest_s", params.rest_s, allowed)
+    require_rest("rest_s", params.rest_s, context.bench, turns=2)
     for station in stations:
         if station.angles is not None and (found := context.bench.violations(station.angles, station.turn)):
             raise BadParameter("rate_deg_s", params.rate_deg_s, f"station {station.label}: {'; '.join(found)}")

@@ -43,9 +43,10 @@ from procedures.procedure import (
 from procedures.reports import whole_turns as pictures
 from procedures.reports.calibration import budget_tables
 from procedures.site_parameters import Arcsec
+from procedures.turn_rests import require_rest, rest_with_demands
 
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
-
+TERM_SOURCE = "ours, after thesis 4.3"
 REST_S = 2.0
 """Rest at the end of a recording where the table's demands take no time [s]."""
 ACCELERATION_SHARE = 0.9
@@ -113,7 +114,7 @@ def resolve(params: Params, context: Context) -> Params:
     ramp_s = PEAK_ACCELERATION * fastest / (ACCELERATION_SHARE * outer.acceleration_deg_s2)
     defaults = {
         "ramp_s": ceil(10.0 * ramp_s) / 10.0,
-        "rest_s": REST_S + ceil(10.0 * context.bench.turn_extra_s) / 10.0,
+        "rest_s": rest_with_demands(REST_S, context.bench),
         "reference_rate_deg_s": fastest,
         "latitude_deg": site.latitude_deg,
         "azimuth_deg": site.azimuth_deg,
@@ -175,11 +176,10 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
         params.reference_rate_deg_s or max(params.rates_deg_s),
     )
     checks = _checks(found, params)
-    warnings = _warnings(params, plan) + launch_warnings(recordings)
     return Result(
         checks=checks,
         verdict=verdict(checks),
-        warnings=warnings,
+        warnings=_warnings(params, plan) + launch_warnings(recordings),
         gyro=found,
         make_calibration=params.make_calibration,
     )
@@ -233,9 +233,7 @@ def _site(params: Params, context: Context) -> Site:
 
 def _require_possible(params: Params, bench: BenchDescription) -> None:
     """Refuse turns that the table cannot make, or not within their recordings, before anything moves."""
-    if (params.rest_s or 0.0) < bench.turn_extra_s:
-        allowed = f"at least {bench.turn_extra_s:.3g} s, which the demands of the table of bench {bench.id} take"
-        raise BadParameter("rest_s", params.rest_s, allowed)
+    require_rest("rest_s", params.rest_s, bench)
     for station in schedule(params):
         if station.angles is not None and (found := bench.violations(station.angles, station.turn)):
             raise BadParameter("rates_deg_s", params.rates_deg_s, f"station {station.label}: {'; '.join(found)}")
@@ -255,9 +253,8 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
     made = _plan(params, context).estimator()
     if made is None:
         return ()
-    sd = dict(
-        zip(coefficient_names(params.terms), (made.covariance.diagonal() ** 0.5 / units.PPM).tolist(), strict=True)
-    )
+    deviations_ppm = (made.covariance.diagonal() ** 0.5 / units.PPM).tolist()
+    sd = dict(zip(coefficient_names(params.terms), deviations_ppm, strict=True))
     of_scale = Limit("ppm", maximum=params.limits.scale_factor_3_sigma_ppm, source="ours")
     found: list[PlannedCheck] = []
     for number, axis in enumerate(AXES, start=1):
@@ -270,9 +267,6 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
     level = params.limits.residual_p_value_min
     limit = Limit("1", minimum=level, source="ours: a test of significance")
     return (*found, PlannedCheck("gyro residuals, p-value of chi-square", limit, level=level))
-
-
-TERM_SOURCE = "ours, after thesis 4.3"
 
 
 def _named(term: Term, limits: Limits) -> tuple[str, float]:
