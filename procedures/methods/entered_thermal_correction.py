@@ -21,7 +21,6 @@ from procedures.procedure import Evidence, Method, Outcome
 Four = Annotated[tuple[float, float, float, float], Field(description="in thesis 4.1's order, a degree")]
 Spread = Annotated[float, Field(ge=0.0)]
 Range = Annotated[tuple[float, float], Field(description="[°C], the lower one first")]
-Range = Annotated[tuple[float, float], Field(description="[°C], the lower one first")]
 FourSpreads = tuple[Spread, Spread, Spread, Spread]
 POWERS = np.array([2, 1, 2, 1, 1, 2, 1, 2])
 """Power of the sensor's reading that each α and β multiplies: α1 α2 α3 α4 β1 β2 β3 β4 of thesis 4.1."""

@@ -216,7 +216,9 @@ def _series(recording: Recording, sensors: Mapping[str, str], params: Params, un
         departures[sensor] = _cells(temperature - params.reference_c, count, size)
         if params.soaks:
             trace = regimes(temperature, cells.cell_s, RegimeSettings(**params.regime.model_dump()))
-            dynamic[sensor] = trace.dynamic[: count * size].reshape(count, size).any(axis=1)
+            dynamic[sensor] = np.asarray(
+                np.any(trace.dynamic[: count * size].reshape(count, size), axis=1), dtype=np.bool_
+            )
     rows = zip(sensors.items(), cells.rates, strict=False)  # the sensors' own rows come after
     return {
         name: Series(_cells(values, count, size), departures[sensor], dynamic.get(sensor))
