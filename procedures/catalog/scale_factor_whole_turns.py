@@ -193,14 +193,8 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 def report(result: Result) -> Report:
     """Coefficients, scale factor over the rates, checks."""
     found = result.gyro
-    return Report(
-        sections=(
-            pictures.turns_table(found),
-            *pictures.rate_figures(found),
-            *budget_tables("gyro", found.budgets),
-            pictures.rate_table(found),
-        )
-    )
+    figures, budgets = pictures.rate_figures(found), budget_tables("gyro", found.budgets)
+    return Report(sections=(pictures.turns_table(found), *figures, *budgets, pictures.rate_table(found)))
 
 
 def _program(params: Params) -> TurnProgram:
