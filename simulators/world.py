@@ -95,7 +95,7 @@ class SimulatedBench(Bench):
         }
 
     def lost_links(self) -> frozenset[str]:
-        """List the devices that do not answer any more, and never will."""
+        """Names of devices whose link is lost for good: the chamber's by its fault `link_lost`, no other's."""
         return frozenset({"chamber"}) if self.chamber is not None and self.chamber.link_lost else frozenset()
 
     def true_calibration(self) -> dict[str, tuple[Array, Array]]:

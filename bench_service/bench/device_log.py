@@ -1,4 +1,6 @@
-"""Readings of table and supply over a recording: taken now and then while its blocks come, kept as means and spreads.
+"""Readings of table, supply, room and status words over a recording, kept as means and spreads.
+
+They are taken now and then while its blocks come.
 
 The encoders are compared with what was commanded at each reading.
 """
@@ -54,7 +56,10 @@ class _Moments:
 
 
 class DeviceLog:
-    """Reads table and supply for one recording."""
+    """Readings of table, supply, room and status words during one recording, kept as means and spreads.
+
+    Refuses an axis that is not where it was commanded.
+    """
 
     def __init__(self, bench: Bench, station: Station) -> None:
         """Set up. Angles are read of a table that stands still and carries the unit: not where a hand sets it."""

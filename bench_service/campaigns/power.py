@@ -91,7 +91,7 @@ def beyond(planned: PlannedCheck, true: float, limit: float) -> float:
 
 
 def smallest_step(planned: PlannedCheck, power: float, of: int) -> float:
-    """Smallest step of one of `of` launches against the others that a scatter between launches finds out so surely.
+    """Smallest step of one of `of` launches that the limit on their scatter finds with the probability `power`.
 
     The scatter s² of n values, of which one lies δ away from the rest, is noncentral: ``(n − 1)·s²/σ²`` has the
     noncentrality ``δ²(n − 1)/(n·σ²)``, σ² = expected² + u². The step is found by bisection, in the limit's unit.

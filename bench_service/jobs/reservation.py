@@ -33,7 +33,7 @@ class Reservation:
     """Time when its holder gave it back early."""
 
     def active(self, at: datetime) -> bool:
-        """Return whether it holds at a moment: the one place where a reservation's end is compared with a clock."""
+        """Return whether it holds at a moment: not given back, before `until`; `reservation_store.py` has it in SQL."""
         return self.ended_at is None and at < self.until
 
     def admits(self, other: "Reservation | None") -> bool:

@@ -62,7 +62,7 @@ def report_figures(report: Report) -> list[Figure]:
 
 @router.get("/results/{result_id}/figures/{number}.svg")
 async def result_figure(result_id: str, number: int, request: Request) -> Response:
-    """Image of a figure of a result's report, by its number from 1."""
+    """Image of a figure of a result's report, by its number from 1; with `v`, the kept image of that version."""
     return await IMAGES.run(_result_figure, result_id, number, request)
 
 

@@ -214,7 +214,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
 
 
 def report(result: Result) -> Report:
-    """Coefficients, checks, residuals and magnitudes (thesis Tables 5.1-5.4, figures 5.6-5.12)."""
+    """Coefficients, scalar cross-checks, budgets, residuals and magnitudes (thesis Tables 5.1-5.4, fig. 5.6-5.12)."""
     magnitudes = [t.magnitudes for t in result.triads]
     tables = [pictures.triad_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]

@@ -88,7 +88,10 @@ def to_rate(position: float, rate: float, target: float, acceleration: float) ->
 
 
 def to_position(position: float, rate: float, target: float, most_rate: float, acceleration: float) -> Path:
-    """Path from a state to rest at a position, within a rate and an acceleration where the state allows it."""
+    """Path from a state to rest at a position, never above the acceleration.
+
+    Where braking carries the axis past the target it comes back; a rate above `most_rate` is braked down to it first.
+    """
     distance = target - position
     brake = rate * abs(rate) / (2.0 * acceleration)
     sign = 1.0 if distance - brake >= 0.0 else -1.0

@@ -44,7 +44,7 @@ class NewsReader:
         self._looking = asyncio.Lock()
 
     async def news(self) -> News:
-        """Return the benches' state, not older than `LOOK_S`. A database that is away is news, too."""
+        """Return the benches' state, read anew after `LOOK_S`; without a database the last one and the trouble."""
         async with self._looking:
             if monotonic_s() - self._news.at_s >= LOOK_S:
                 self._news = await asyncio.to_thread(self._look, self._news)

@@ -50,7 +50,9 @@ class Lines(logging.Formatter):
 
 
 def set_up(settings: Settings, level: str) -> None:
-    """Write lines of at least this level to standard error, or to the settings' log file.
+    """Write this service's lines of at least this level to standard error, or to the settings' log file.
+
+    "This service's" are those of `bench_service` and `procedures`; of other packages warnings and errors are written.
 
     The setting `log_level` counts more than `level`, where given. Raises `Misconfigured` for a file that cannot be
     written.

@@ -108,7 +108,7 @@ class Kvh1750:
         return [LogTable("format A", columns, (), None, self._count, (), _ASKS)]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the frames' values."""
+        """Yield blocks of frames: the arrays of the named columns, in their order."""
         for found in frames(self._stream, _Frames(), Counted()):
             data = np.frombuffer(b"".join(frame for _, frame in found), _FRAME)
             yield [_column(data, name) for name in columns]

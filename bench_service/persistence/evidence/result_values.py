@@ -82,7 +82,7 @@ def values_query(name: str) -> Select[*tuple[Any, ...]]:
 
 
 def value_of_row(session: Session, row: Row[*tuple[Any, ...]], name: str) -> ResultValue:
-    """Read the value of the quantity from one result's row."""
+    """Read the value of the quantity from a row of `values_query(name)`, of the same name."""
     about = {"result": row.id, "job": row.job_id, "at": row.created_at}
     return copied(ResultValue, row, **about, quantity=_quantity(session, row, name))
 

@@ -1,8 +1,9 @@
 """Reservations of benches and units in SQL. Transactions for the same name take turns: one of two rivals gets it."""
 
 from datetime import datetime
+from typing import Any
 
-from sqlalchemy import bindparam, select
+from sqlalchemy import ColumnElement, bindparam, select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.reservation import Reservation, Reserved
@@ -14,11 +15,13 @@ from bench_service.persistence.idempotency import again_after_conflict, made_bef
 from bench_service.persistence.pages import page
 from bench_service.persistence.tables.jobs import ReservationRow
 
-_ACTIVE = (
-    select(ReservationRow)
-    .where(ReservationRow.ended_at.is_(None), ReservationRow.until > bindparam("at"))
-    .order_by(ReservationRow.id)
-)
+
+def _holds(at: Any) -> tuple[ColumnElement[bool], ...]:
+    """`Reservation.active` in SQL."""
+    return ReservationRow.ended_at.is_(None), ReservationRow.until > at
+
+
+_ACTIVE = select(ReservationRow).where(*_holds(bindparam("at"))).order_by(ReservationRow.id)
 
 
 class SqlReservationStore:
@@ -55,7 +58,7 @@ class SqlReservationStore:
     ) -> Page[Reservation]:
         query = select(ReservationRow)
         if active_at is not None:
-            query = query.where(ReservationRow.ended_at.is_(None), ReservationRow.until > active_at)
+            query = query.where(*_holds(active_at))
         with self._database.read() as session:
             return page(session, query, ReservationRow.id, after, limit, reservation_of_row)
 
