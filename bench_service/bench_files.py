@@ -3,7 +3,7 @@
 Composed here because it joins devices, stop guard and database.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.make_safe import Rescue, before_anything_else
@@ -76,6 +76,9 @@ class _Books:
 
     def standing(self) -> tuple[BenchStop, ...]:
         return self._stores.benches.standing_stops(self._bench_id)
+
+    def stored(self, ids: Iterable[str]) -> tuple[BenchStop, ...]:
+        return self._stores.benches.stored_stops(ids)
 
     def enter(self, word: StopWord) -> None:
         self._entry.enter(self._bench_id, word)

@@ -3,7 +3,7 @@
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Protocol
 
@@ -53,6 +53,10 @@ class BenchRegistry(Protocol):
 
     def standing_stops(self, bench_id: str) -> tuple[BenchStop, ...]:
         """The stops that keep a bench from working, oldest first; empty where it may work."""
+        ...
+
+    def stored_stops(self, ids: Iterable[str]) -> tuple[BenchStop, ...]:
+        """Those of some stops that are stored, standing or released. None is ever deleted."""
         ...
 
     def bench_stop(self, bench_id: str) -> BenchStop | None:

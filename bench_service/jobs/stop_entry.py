@@ -16,6 +16,9 @@ from bench_service.wall_clock import now
 REQUESTS = frozenset({"http", "page"})
 """Ways of a stop for which the audit trail already has an entry, as a request."""
 
+RESTORED = "the books did not have it: restored from the bench's device folder"
+"""Remark in the reason and in the audit trail of a stop that a restored database did not know."""
+
 log = logging.getLogger(__name__)
 
 
@@ -37,7 +40,8 @@ class StopEntry:
 
         A stop that was released before the entry is complete ends no job: the one that runs by then began after it.
         """
-        stop = self._benches.stop_bench(BenchStop(bench_id, word.at, word.reason, by=word.by, id=word.id))
+        reason = f"{word.reason} ({RESTORED})" if word.restored and RESTORED not in word.reason else word.reason
+        stop = self._benches.stop_bench(BenchStop(bench_id, word.at, reason, by=word.by, id=word.id))
         running = self._queue.running(bench_id) if stop.stands else None
         if running is not None:
             with suppress(IllegalTransition, NotUnderstood):  # it has ended this moment; or this version cannot read it
@@ -46,14 +50,16 @@ class StopEntry:
         return None if running is None else running.id
 
     def _note(self, word: StopWord, stop: BenchStop) -> None:
-        """Note in the audit trail a stop that no request's entry shows, or that the database took late."""
+        """Note in the audit trail a stop that no request's entry shows, or that the database took late or again."""
         late_s = ((stop.entered_at or word.at) - word.at).total_seconds()
-        if late_s <= LATE_S and word.via in REQUESTS:
+        if late_s <= LATE_S and word.via in REQUESTS and not word.restored:
             return
         text = f"entered {late_s:.1f} s after it was asked for" if late_s > LATE_S else "entered in time"
+        if word.restored:
+            text = f"{RESTORED}, {late_s:.1f} s after it was asked for"
         detail = {"stop": word.id, "reason": word.reason, "via": word.via, "asked_at": word.at.isoformat()}
         entry = AuditEntry(
             word.id, now(), word.by, "stop", f"bench {stop.bench}", "noted", {"text": text, "late_s": late_s, **detail}
         )
-        if self._trail.add_once(entry) and late_s > LATE_S:
-            log.warning("a stop of bench %s is stored %.1f s after it was requested", stop.bench, late_s)
+        if self._trail.add_once(entry) and (late_s > LATE_S or word.restored):
+            log.warning("a stop of bench %s is stored %.1f s after it was requested: %s", stop.bench, late_s, text)

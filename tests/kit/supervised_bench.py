@@ -1,6 +1,8 @@
 """A supervisor with books, watch and lease that a test switches, on real files and processes."""
 
 import subprocess
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,11 +38,20 @@ class Books:
     def standing(self) -> tuple[BenchStop, ...]:
         self._ask()
         by_hand = (self.by_hand,) if self.is_stopped else ()
-        return (*by_hand, *self.entered.values())
+        return (*by_hand, *(stop for stop in self.entered.values() if stop.stands))
+
+    def stored(self, ids: Iterable[str]) -> tuple[BenchStop, ...]:
+        self._ask()
+        known = {self.by_hand.id: replace(self.by_hand, released_at=None if self.is_stopped else wall_clock.now())}
+        return tuple(found for each in ids if (found := (known | self.entered).get(each)) is not None)
+
+    def release(self, stop_id: str) -> None:
+        """A release by somebody who has only the database."""
+        self.entered[stop_id] = replace(self.entered[stop_id], released_at=wall_clock.now(), released_by="Bo")
 
     def enter(self, word: StopWord) -> None:
         self._ask()
-        self.entered[word.id] = BenchStop("sim", word.at, word.reason, by=word.by, id=word.id)
+        self.entered.setdefault(word.id, BenchStop("sim", word.at, word.reason, by=word.by, id=word.id))
 
     def confirm_safe(self, by: str) -> None:
         self._ask()

@@ -106,6 +106,21 @@ class StopChannel:
         """Remove stop requests that were released."""
         self._change(ids, lambda _: None)
 
+    def replace_damaged(self) -> None:
+        """Put a stop of its own, which the database can have and a person release, in place of an unreadable record.
+
+        Nobody else writes meanwhile, so of two processes that do it at once one finds nothing left to replace.
+        """
+        if all(word.id != DAMAGED.id for word in self.standing()):
+            return
+        with suppress(FileNotFoundError), self._locked() as file:
+            for number in range(_FIRST, _FIRST + WORDS):
+                found = _document(file, number)
+                if found is not None and found["id"] == DAMAGED.id:
+                    record = encoded(StopWord(DAMAGED.reason, DAMAGED.by, DAMAGED.via).document())
+                    assert record is not None, "its texts are short"
+                    write_record(file, number, record)
+
     def answer(self, role: int, answer: StopAnswer) -> None:
         """Publish the worker's or supervisor's answer to the stop requests; an unchanged answer is not written."""
         if answer == self._answers[role]:

@@ -22,6 +22,8 @@ class StopWord:
     at: datetime = field(default_factory=now)
     booked: bool = False
     """True once the database has it."""
+    restored: bool = False
+    """True where a database that had it does not know it any more: it is entered again. Not kept in the channel."""
 
     def __post_init__(self) -> None:
         """Escape the characters of its texts that no database and no answer can hold.
@@ -35,7 +37,9 @@ class StopWord:
 
     def document(self) -> dict[str, Any]:
         """The request as a JSON object, its texts cut to the room of a record."""
-        return {**asdict(self), "at": self.at.isoformat(), "reason": self.reason[:REASON], "by": self.by[:BY]}
+        found = {**asdict(self), "at": self.at.isoformat(), "reason": self.reason[:REASON], "by": self.by[:BY]}
+        del found["restored"]  # a process of an older version reads the record too
+        return found
 
     @classmethod
     def of(cls, document: dict[str, Any]) -> "StopWord":

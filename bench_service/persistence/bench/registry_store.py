@@ -1,6 +1,6 @@
 """Benches in SQL, as their workers registered them, and their stops."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -105,6 +105,11 @@ class SqlBenchRegistry:
     def standing_stops(self, bench_id: str) -> tuple[BenchStop, ...]:
         with self._database.read() as session:
             return standing_stops(session, bench_id)
+
+    def stored_stops(self, ids: Iterable[str]) -> tuple[BenchStop, ...]:
+        with self._database.read() as session:
+            rows = session.scalars(select(BenchStopRow).where(BenchStopRow.id.in_(list(ids))))
+            return tuple(map(_stop_of_row, rows))
 
     def bench_stop(self, bench_id: str) -> BenchStop | None:
         with self._database.read() as session:

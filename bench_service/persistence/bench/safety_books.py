@@ -4,6 +4,8 @@ It needs few tables, and loads nothing else. The database is opened at the first
 even while the database does not answer.
 """
 
+from collections.abc import Iterable
+
 from sqlalchemy import ColumnElement, select
 
 from bench_service import wall_clock
@@ -41,6 +43,9 @@ class SqlSafetyBooks:
 
     def standing(self) -> tuple[BenchStop, ...]:
         return SqlBenchRegistry(self._database).standing_stops(self._bench_id)
+
+    def stored(self, ids: Iterable[str]) -> tuple[BenchStop, ...]:
+        return SqlBenchRegistry(self._database).stored_stops(ids)
 
     def enter(self, word: StopWord) -> None:
         database = self._database
