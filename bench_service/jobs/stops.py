@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.safety import Safety, SafetyService
-from bench_service.bench.stop.road import StopRoads
+from bench_service.bench.stop.road import Sent, StopRoads
 from bench_service.bench.stop.word import StopWord
 from bench_service.jobs.stop_entry import StopEntry
 from bench_service.jobs.stop_keys import StopKeys
@@ -87,20 +87,31 @@ class StopService:
 
     def _stop(self, bench_id: str, word: StopWord, books_by_s: float, patient: bool) -> Stopped:
         road = self._roads.to(bench_id)
-        found = None if road is None else road.ask(word)
+        here = road is not None and road.here
+        sent = Sent(False) if road is None else road.ask(word)
         entering = self._ledger.enter(bench_id, word)
-        if road is not None and road.here:
-            safety = self._safety.stopping(bench_id, patient)
+        if not sent.taken:
+            # A stop that no bench has received is in the database or nowhere: the caller waits for that.
+            job, books = self._entered(entering, BOOKS_S)
+            if books:
+                raise StorageFailure(f"{self._roads.unreached(bench_id, here)} ({books}; it is tried again)")
+            safety = self._safety_here(bench_id, patient) if here else self._safety.stopping_elsewhere(bench_id)
+        elif here:
+            safety = sent.safety or self._safety_here(bench_id, patient)
             job, books = self._entered(entering, books_by_s - monotonic_s())
             job = job or (safety.devices.job if safety.devices is not None and safety.worker is not None else None)
         else:
-            # A stop that no bench has received is in the database or nowhere: the caller waits for that.
-            within_s = books_by_s - monotonic_s() if found is not None else BOOKS_S
-            job, books = self._entered(entering, within_s)
-            if found is None and books:
-                raise StorageFailure(f"{self._roads.unreached(bench_id)} ({books}; it is tried again)")
-            safety = found or self._safety.stopping_elsewhere(bench_id)
+            job, books = self._entered(entering, books_by_s - monotonic_s())
+            safety = sent.safety or self._safety.stopping_elsewhere(bench_id)
         return Stopped(BenchStop(bench_id, word.at, word.reason, by=word.by, id=word.id), job, safety, books)
+
+    def _safety_here(self, bench_id: str, patient: bool) -> Safety:
+        """The safety of a bench on this host; not known where its files cannot be read, for want of a descriptor."""
+        try:
+            return self._safety.stopping(bench_id, patient)
+        except OSError as error:
+            text = f"The stop is passed on; whether the bench is safe cannot be read here: {error}."
+            return Safety(None, text, None, None, None)
 
     def _enter(self, bench_id: str, word: StopWord) -> str | None:
         self._benches.description(bench_id)

@@ -12,6 +12,7 @@ from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.elsewhere import ListenerRoad, StopAddresses
 from bench_service.bench.stop.listener import CONNECTIONS, StopListener
 from bench_service.bench.stop.messages import Listening, made_secret, proof, read_secret
+from bench_service.bench.stop.road import Sent, StopRoads
 from bench_service.bench.stop.word import StopWord
 from bench_service.model.errors import StorageFailure
 from bench_service.wall_clock import monotonic_s, pause
@@ -46,7 +47,7 @@ def at(listener: StopListener) -> Listening:
 
 def test_a_stop_is_taken_and_its_answer_is_believed(listener: StopListener, channel: StopChannel) -> None:
     word = StopWord("smoke", "Olena", "http")
-    safety = ListenerRoad("sim", at(listener), SECRET).ask(word)
+    safety = ListenerRoad("sim", at(listener), SECRET).ask(word).safety
     assert safety is not None
     assert safety.safe is True
     assert "the devices are safe" in safety.explanation
@@ -60,7 +61,7 @@ def test_without_the_secret_or_for_another_bench_nothing_is_taken(
     listener: StopListener, channel: StopChannel, bench: str
 ) -> None:
     secret = b"another secret, also long enough" if bench == "sim" else SECRET
-    assert ListenerRoad(bench, at(listener), secret).ask(StopWord("smoke", "Olena", "http")) is None
+    assert ListenerRoad(bench, at(listener), secret).ask(StopWord("smoke", "Olena", "http")) == Sent(False)
     assert channel.standing() == ()
 
 
@@ -99,13 +100,13 @@ def test_what_is_no_message_ends_its_connection_and_nothing_else(
         assert bad.recv(100) == b""
     bad.close()
     assert channel.standing() == ()
-    assert ListenerRoad("sim", at(listener), SECRET).ask(StopWord("smoke", "Olena", "http")) is not None
+    assert ListenerRoad("sim", at(listener), SECRET).ask(StopWord("smoke", "Olena", "http")).taken
 
 
 def test_idle_connections_keep_no_stop_out(listener: StopListener) -> None:
     idle = [connected(listener)[0] for _ in range(2 * CONNECTIONS)]
     begun_s = monotonic_s()
-    assert ListenerRoad("sim", at(listener), SECRET).ask(StopWord("smoke", "Olena", "http")) is not None
+    assert ListenerRoad("sim", at(listener), SECRET).ask(StopWord("smoke", "Olena", "http")).taken
     assert monotonic_s() - begun_s < 2.0
     for each in idle:
         each.close()
@@ -126,7 +127,9 @@ def test_a_listener_that_lies_about_the_bench_is_not_believed(channel: StopChann
 
         thread = Thread(target=lie)
         thread.start()
-        assert ListenerRoad("sim", Listening(f"{host}:{port}", "x"), SECRET).ask(StopWord("a", "b", "http")) is None
+        assert ListenerRoad("sim", Listening(f"{host}:{port}", "x"), SECRET).ask(StopWord("a", "b", "http")) == Sent(
+            False
+        )
         thread.join()
 
 
@@ -154,3 +157,23 @@ def test_addresses_are_kept_while_the_database_is_away(tmp_path: Path) -> None:
     addresses.end()
     secret.write_text("short")
     assert read_secret(secret) is None
+
+
+def test_where_the_channel_of_this_host_takes_nothing_the_listener_is_asked(
+    listener: StopListener, channel: StopChannel, tmp_path: Path
+) -> None:
+    """As where the device folder belongs to another user: here the file cannot be opened, and nobody has a socket."""
+    folder = tmp_path / "another's"
+    (folder / "bench-sim.stop").mkdir(parents=True)
+    word = StopWord("smoke", "Olena", "http")
+    nobody, somebody = (
+        StopRoads(folder).to("sim"),
+        StopRoads(folder, lambda bench: ListenerRoad(bench, at(listener), SECRET)).to("sim"),
+    )
+    assert nobody is not None
+    assert somebody is not None
+    assert nobody.here
+    assert nobody.ask(word) == Sent(False)
+    assert channel.standing() == ()
+    assert somebody.ask(word).taken
+    assert [one.id for one in channel.standing()] == [word.id]

@@ -7,12 +7,14 @@ from pathlib import Path
 import httpx
 import pytest
 
+from bench_service.bench.processes import HOST
 from bench_service.bench.safety import SafetyService
 from bench_service.cli.asking.client import connect
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.model.errors import NotSafe
 from bench_service.persistence import open_stores
 from bench_service.settings import Settings
+from bench_service.wall_clock import monotonic_s
 from tests.service.client import Client
 from tests.service.page import page
 
@@ -166,6 +168,36 @@ def test_a_stop_that_cannot_be_written_is_not_answered_as_done(tmp_path: Path) -
         other.close()
         assert http.post(f"{BENCH}/stop").status_code == 503
         assert http.get(f"{BENCH}/stops").json()["items"] == []
+
+
+def test_a_stop_on_its_own_host_that_nothing_has_taken_is_answered_with_503_and_says_where_to_press(
+    tmp_path: Path,
+) -> None:
+    """Its channel takes nothing, as where the folder is another user's; it was answered with 202 all the same."""
+    file = tmp_path / "bench.sqlite"
+    stores, database = open_stores(f"sqlite:///{file}")
+    stores.benches.put_bench(SimulatedDriver("sim").description)
+    database.dispose()
+    settings = Settings(database_url=f"sqlite:///{file}")
+    (settings.devices_in() / "bench-sim.stop").mkdir(parents=True)
+    with connect(settings, None, drive=False) as http:
+        other = sqlite3.connect(file, isolation_level=None)
+        other.execute("BEGIN EXCLUSIVE")
+        try:
+            begun_s = monotonic_s()
+            answer = http.post(f"{BENCH}/stop", json={"reason": "smoke", "by": "Ada"})
+            took_s = monotonic_s() - begun_s
+        finally:
+            other.execute("ROLLBACK")
+            other.close()
+        assert answer.status_code == 503, answer.text
+        assert took_s < 6.0, "a second for the database, far below the 30 s of its lock, and a loaded machine"
+        said = answer.json()["detail"]
+        assert "has NOT reached bench 'sim': its stop channel on this host takes nothing" in said
+        assert f"Press the hardware emergency stop, or run `bench stop --bench sim` at host {HOST}" in said
+        taken = http.post(f"{BENCH}/stop", json={"reason": "smoke again", "by": "Ada", "wait": False})
+        assert taken.status_code == 202, "the database has taken it, and the other one by now"
+        assert {"smoke", "smoke again"} == {one["reason"] for one in http.get(f"{BENCH}/stops").json()["items"]}
 
 
 def test_a_stop_sent_again_with_its_key_is_the_same_stop_and_after_its_release_changes_nothing(client: Client) -> None:

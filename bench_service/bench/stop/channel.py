@@ -62,7 +62,8 @@ class StopChannel:
     @property
     def exists(self) -> bool:
         """True where the bench has, or had, a process on this host."""
-        return self._path.exists() or (self._folder / f"bench-{self.bench_id}.devices").exists()
+        devices = self._folder / f"bench-{self.bench_id}.devices"
+        return os.path.exists(self._path) or os.path.exists(devices)  # unlike `Path.exists`, false for another's folder
 
     def prepare(self) -> None:
         """Make the file with its full length. Raises `OSError` where there is no room."""
@@ -113,7 +114,7 @@ class StopChannel:
         """
         if all(word.id != DAMAGED.id for word in self.standing()):
             return
-        with suppress(FileNotFoundError), self._locked() as file:
+        with suppress(OSError), self._locked() as file:
             for number in range(_FIRST, _FIRST + WORDS):
                 found = _document(file, number)
                 if found is not None and found["id"] == DAMAGED.id:
@@ -250,7 +251,15 @@ class StopChannel:
             changed = change(self._came.pop(word_id))
             if changed is not None:
                 self._came[word_id] = changed
-        with suppress(FileNotFoundError), self._locked() as file:
+        try:
+            self._change_file(wanted, change)
+        except FileNotFoundError:
+            return
+        except OSError as error:  # no descriptor left, or another user's file: a later comparison does it
+            log.warning("the stop channel of bench %s cannot be changed: %s", self.bench_id, error)
+
+    def _change_file(self, wanted: set[str], change: Callable[[StopWord], StopWord | None]) -> None:
+        with self._locked() as file:
             for number in range(_FIRST, _FIRST + WORDS):
                 found = _document(file, number)
                 if found is not None and found["id"] in wanted:

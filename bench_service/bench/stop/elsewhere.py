@@ -19,6 +19,7 @@ from bench_service.bench.stop.messages import (
     send_line,
     split_address,
 )
+from bench_service.bench.stop.road import Sent
 from bench_service.bench.stop.word import StopWord
 from bench_service.model.errors import ServiceError
 from bench_service.wall_clock import monotonic_s
@@ -42,18 +43,18 @@ class ListenerRoad:
         self._at = at
         self._secret = secret
 
-    def ask(self, word: StopWord) -> Safety | None:
-        """Send the stop request; the supervisor's answer, None where it cannot be reached."""
+    def ask(self, word: StopWord) -> Sent:
+        """Send the stop request to the supervisor; not taken where it cannot be reached, or refuses."""
         try:
             found = self._exchange(word)
         except (BadMessage, OSError, ValueError, KeyError) as error:
             log.warning("the supervisor of bench %s at %s: %s", self._bench_id, self._at.address, error)
-            return None
+            return Sent(False)
         if not found["taken"]:
-            return None
+            return Sent(False)
         state = "the devices are safe" if found["safe"] else "the devices are NOT safe yet"
         text = f"The bench's supervisor on host {found['host']} has the stop ({found['state']}); {state}."
-        return Safety(bool(found["safe"]), text, None, None, None)
+        return Sent(True, Safety(bool(found["safe"]), text, None, None, None))
 
     def _exchange(self, word: StopWord) -> dict[str, object]:
         by_s = monotonic_s() + ANSWER_S

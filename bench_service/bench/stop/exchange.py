@@ -3,8 +3,10 @@
 The channel comes first and needs nothing; the database follows, and records when it was late. A stop leaves the channel
 only where the database has it as released. A database that does not know it at all was restored from an older copy, or
 replaced: the stop is entered there again, and stands. Released stops are kept for ever, so a released one never comes
-back that way. Called again and again, in a thread that may hang in the database, by the supervisor and by the process that drives the bench: entering a
-stop twice, or removing it twice, changes nothing.
+back that way.
+
+Called again and again, in a thread that may hang in the database, by the supervisor and by the process that drives the
+bench: entering a stop twice, or removing it twice, changes nothing.
 """
 
 from collections.abc import Iterable, Mapping

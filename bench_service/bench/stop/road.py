@@ -4,19 +4,33 @@ Neither needs the database. The address of a bench's supervisor is read while th
 memory (`StopAddresses`).
 """
 
+import logging
 import re
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 from typing import Protocol
 
+from bench_service.bench.processes import HOST
 from bench_service.bench.safety import Safety
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.word import StopWord
 
+log = logging.getLogger(__name__)
 BENCH_ID = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")
 """Bench names that may become part of a file's name."""
+
+
+@dataclass(frozen=True)
+class Sent:
+    """The outcome of a stop request on its way to the bench."""
+
+    taken: bool
+    """True where the bench has it: in the stop channel's file, or in the hands of its worker or supervisor."""
+    safety: Safety | None = None
+    """The bench's safety then, where the way itself reports it."""
 
 
 class StopRoad(Protocol):
@@ -27,21 +41,29 @@ class StopRoad(Protocol):
         """True where the bench's devices are on this host."""
         ...
 
-    def ask(self, word: StopWord) -> Safety | None:
-        """Send a stop request to the bench; its safety then, where this way itself reports it."""
+    def ask(self, word: StopWord) -> Sent:
+        """Send a stop request to the bench. Raises nothing: one that did not arrive is not taken."""
         ...
 
 
 class ChannelRoad:
-    """`StopRoad` over the channel in this host's device folder."""
+    """`StopRoad` over the channel in this host's device folder, and over the supervisor's listener where that fails.
+
+    The channel takes nothing where its file belongs to another user, or no descriptor is left.
+    """
 
     here = True
 
-    def __init__(self, channel: StopChannel) -> None:
+    def __init__(self, channel: StopChannel, otherwise: Callable[[str], StopRoad | None]) -> None:
         self._channel = channel
+        self._otherwise = otherwise
 
-    def ask(self, word: StopWord) -> None:
-        self._channel.ask(word)
+    def ask(self, word: StopWord) -> Sent:
+        if self._channel.ask(word):
+            return Sent(True)
+        log.warning("the stop channel of bench %s did not take a stop by %s", self._channel.bench_id, word.by)
+        other = self._otherwise(self._channel.bench_id)
+        return Sent(False) if other is None else other.ask(word)
 
 
 class StopRoads:
@@ -81,7 +103,7 @@ class StopRoads:
     def to(self, bench_id: str) -> StopRoad | None:
         """The way to a bench; None where the database is the only one."""
         channel = self.channel(bench_id)
-        return self._elsewhere(bench_id) if channel is None else ChannelRoad(channel)
+        return self._elsewhere(bench_id) if channel is None else ChannelRoad(channel, self._elsewhere)
 
     def wake(self, bench_id: str) -> None:
         """Wake the bench's worker, if it is on this host: there may be something to do."""
@@ -89,12 +111,18 @@ class StopRoads:
         if channel is not None:
             channel.wake()
 
-    def unreached(self, bench_id: str) -> str:
-        """The message to a person whose stop has reached no process."""
-        host = self._where(bench_id)
+    def unreached(self, bench_id: str, here: bool) -> str:
+        """The message to a person whose stop has reached no process; `here`: the bench is on this host."""
+        host = HOST if here else self._where(bench_id)
         at = f"host {host}" if host else "the bench's own host"
+        why = (
+            "its stop channel on this host takes nothing (the device folder belongs to another user, or this process "
+            "has no file descriptor left)"
+            if here
+            else "its devices are not on this host"
+        )
         return (
-            f"the stop has NOT reached bench {bench_id!r}: its devices are not on this host, its supervisor cannot be "
-            f"reached from here, and the database does not answer. Press the hardware emergency stop, or run `bench "
-            f"stop --bench {bench_id}` at {at}."
+            f"the stop has NOT reached bench {bench_id!r}: {why}, its supervisor cannot be reached from here, and the "
+            f"database does not answer. Press the hardware emergency stop, or run `bench stop --bench {bench_id}` at "
+            f"{at}{', as the user whose service drives the bench' if here else ''}."
         )
