@@ -14,9 +14,20 @@ from bench_service.bench.stop.channel import WORKER, StopChannel
 UNANSWERED_S = 3.0
 """Time that a worker may leave a stop unanswered, while its bench is not safe, before it is killed [s]."""
 HUNG_S = 10.0
-"""Time that a worker may take from seeing a stop until the bench is safe, before it is killed [s]."""
+"""Shortest time that a worker is given from seeing a stop until the bench is safe, before it is killed [s]."""
+MARGIN_S = 5.0
+"""Time beyond the declared time of the slowest device [s]: the work is left first, and the devices are read back."""
 COUNTED_S = 0.5
 """Maximum part of the time between two looks that counts [s]: this process may have been held up itself."""
+
+
+def hung_after_s(safe_s: float) -> float:
+    """Time that a worker is given from seeing a stop until the bench is safe [s].
+
+    `safe_s`: the longest time that a device of the bench is declared to need; 0 where none is declared. A worker that
+    is killed while a table brakes for its declared 60 s would leave it in mid-braking.
+    """
+    return max(HUNG_S, safe_s + MARGIN_S)
 
 
 class WorkerPatience:

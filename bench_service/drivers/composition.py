@@ -75,6 +75,27 @@ def own_devices(settings: Settings) -> BenchDevices:
     return devices_of(settings.devices_in(), settings.bench_id, settings.bench_file)
 
 
+def longest_safe_s(settings: Settings) -> float:
+    """The longest time within which a device of the settings' bench is declared to be safe [s]; 0 on a simulated one.
+
+    By the same bench file as `own_devices`. One that cannot be read any more counts as a table without a declaration:
+    whoever waits too short would kill a worker in mid-braking.
+    """
+    file = settings.bench_file
+    if file is None:
+        state = DeviceRegister(settings.devices_in(), settings.bench_id).read()
+        if state is None or not state.bench_file:
+            return 0.0
+        file = Path(state.bench_file)
+    from bench_service.drivers.interface.sections import Wire, WireTurntable
+
+    try:
+        devices = _kept(file.absolute()).real().values()
+    except Misconfigured:
+        return float(WireTurntable.model_fields["safe_s"].default)
+    return max((device.safe_s for device in devices if isinstance(device, Wire)), default=0.0)
+
+
 def _require_id(found: str, settings: Settings) -> None:
     if found != settings.bench_id:
         raise Misconfigured(f"{settings.bench_file} is of bench {found!r}, and the settings of {settings.bench_id!r}")

@@ -125,7 +125,8 @@ def _begin(open_run: Callable[..., Run], arguments: tuple[Any, ...]) -> None:
 
 def begin_process() -> None:
     """Set up a new process of the service: it leaves interrupts to the service, and ends with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     Thread(target=_end_with_the_service, name="end with the service", daemon=True).start()
 
 

@@ -1,15 +1,20 @@
-"""Ctrl-C while a command watches its job, as processes: what becomes of the job, and how it goes on."""
+"""Ctrl-C, or a closed terminal, while a command watches its job: what becomes of the job, and how it goes on."""
 
+import fcntl
+import os
 import signal
 import sqlite3
 import subprocess
 import sys
+import termios
 from collections.abc import Generator
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from bench_service.cli.processes.ending import ending_like_ctrl_c
+from bench_service.drivers.device_register import DeviceRegister
 from bench_service.wall_clock import monotonic_s, pause
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.command_line import Command, Done, command_in, environment
@@ -62,6 +67,60 @@ def test_a_job_left_with_ctrl_c_is_paused_and_goes_on_only_when_it_is_asked_for(
     assert resumed.json()["job"]["state"] == "succeeded"
     assert resumed.json()["job"]["attempt"] == 2
     assert len(resumed.json()["result"]["lineage"]["recordings"]) == 12
+
+
+def test_a_job_whose_terminal_is_closed_is_paused_and_its_bench_safe(tmp_path: Path) -> None:
+    """It has no supervisor: a process that the hang-up killed left table and unit as they were until the next start."""
+    terminal, its_end = os.openpty()
+    os.set_blocking(terminal, False)
+    with subprocess.Popen(
+        [sys.executable, "-m", "bench_service", *RUN, "dwell_s=120.0"],
+        env=environment(tmp_path, BENCH_REAL_TIME_FACTOR="150"),
+        cwd=tmp_path,
+        stdin=its_end,
+        stdout=its_end,
+        stderr=its_end,
+        start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    ) as run:
+        os.close(its_end)
+        until = monotonic_s() + 60
+        while stations_done(tmp_path) < 1:
+            with suppress(BlockingIOError):
+                os.read(terminal, 100_000)
+            assert run.poll() is None
+            assert monotonic_s() < until
+            pause(0.05)
+        os.close(terminal)
+        assert run.wait(60) == 130
+    state = DeviceRegister(tmp_path, "sim").read()
+    assert state is not None
+    assert (state.unsafe, state.linked) == ((), False)
+    with sqlite3.connect(tmp_path / "bench.sqlite") as database:
+        assert database.execute("SELECT state FROM jobs").fetchall() == [("paused",)]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_such_a_signal_interrupts_once_and_nothing_interrupts_the_end(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with ending_like_ctrl_c() as ignore:
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), number)
+        os.kill(os.getpid(), number)  # as terminal and shell do
+    with ending_like_ctrl_c() as ignore:
+        ignore()
+        os.kill(os.getpid(), number)
+    assert signal.getsignal(number) == before
+
+
+def test_a_command_under_nohup_outlives_its_terminal() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with ending_like_ctrl_c():
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 @pytest.fixture

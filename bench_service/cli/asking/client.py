@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -27,7 +27,8 @@ RESULT = ("id", "verdict", "document")
 def connect(settings: Settings, server: str | None, drive: bool) -> Generator["httpx.Client"]:
     """Open a client to `server`, or to an application in this process that is open as long as the block.
 
-    `drive`: true where the embedded application is to run jobs, for which it must have the bench to itself.
+    `drive`: true where the embedded application is to run jobs, for which it must have the bench to itself. SIGTERM and
+    SIGHUP then raise `KeyboardInterrupt` in the block, as Ctrl-C does.
     Raises `Refused` where no service answers a request made in the block.
     """
     import httpx
@@ -70,11 +71,13 @@ def _client(settings: Settings, server: str | None, drive: bool) -> Generator["h
         with httpx.Client(base_url=_address(server), timeout=TIMEOUT_S, headers=_token(settings)) as client:
             yield client
         return
+    from bench_service.cli.processes.ending import ending_like_ctrl_c
     from bench_service.cli.processes.serving import (
         serving,  # a quarter of a second that a client of a server does not need
     )
 
-    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+    signals = ending_like_ctrl_c() if drive else nullcontext(lambda: None)
+    with signals as ignore_signals, tempfile.TemporaryDirectory(prefix="bench-") as folder:
         socket_file = Path(folder) / "http"
         with (
             serving(settings, drive, socket_file),
@@ -82,7 +85,10 @@ def _client(settings: Settings, server: str | None, drive: bool) -> Generator["h
                 base_url="http://embedded", transport=httpx.HTTPTransport(uds=str(socket_file)), timeout=TIMEOUT_S
             ) as client,
         ):
-            yield client
+            try:
+                yield client
+            finally:
+                ignore_signals()  # from here on the bench is made safe
 
 
 def call(client: "httpx.Client", method: str, path: str, fields: Sequence[str], **options: Any) -> Any:

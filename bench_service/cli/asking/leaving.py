@@ -1,4 +1,5 @@
-"""Ctrl-C while a command watches a job: what becomes of the job, and how to continue.
+"""Ctrl-C while a command watches a job: what becomes of the job, and how to continue. SIGTERM and a closed terminal
+(SIGHUP) do the same to a command that drives a bench itself.
 
 A job of a service continues there. A job that the command's own process drives is asked to pause, so that no later
 process takes it up by itself: the request stays with the job if this process ends before the bench comes to it.
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 PAUSE_S = 10.0
 """Longest time that a command waits for the pause [s]: a station may take hours."""
 INTERRUPTED = 130
-"""Exit code of a command that a person ended with Ctrl-C."""
+"""Exit code of a command that Ctrl-C ended, or one of the signals that do the same."""
 LOOK_S = 0.1
 """Interval between two looks at the job [s]."""
 

@@ -14,10 +14,11 @@ from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.listener import StopListener
 from bench_service.bench.stop.messages import made_secret
 from bench_service.bench.supervisor import Supervisor
+from bench_service.bench.worker_patience import hung_after_s
 from bench_service.cli.processes.ending import ending_on_signals
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
-from bench_service.drivers.composition import own_devices
+from bench_service.drivers.composition import longest_safe_s, own_devices
 from bench_service.model.errors import BenchBusy
 from bench_service.persistence import acquire_lease
 from bench_service.persistence.bench.host_files import HostFiles, SupervisorLock
@@ -68,7 +69,9 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
             log.info("supervising bench %s", bench)
         else:
             say(f"supervising bench {bench}")
-        Supervisor(bench, devices, files, books, take_lease, channel, heartbeat, listener).run(ending, companion)
+        hung_s = hung_after_s(longest_safe_s(settings))
+        watching = Supervisor(bench, devices, files, books, take_lease, channel, heartbeat, listener, hung_s=hung_s)
+        watching.run(ending, companion)
     return 0
 
 

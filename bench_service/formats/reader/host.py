@@ -14,7 +14,8 @@ from bench_service.formats.reader.child import serve
 def main(descriptor: int) -> None:
     """Fork a child for each line that comes through the socket of that descriptor."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # children are not waited for
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the service, which then closes the line
+    for number in (signal.SIGINT, signal.SIGHUP):  # Ctrl-C, a closed terminal: for the service, which closes the line
+        signal.signal(number, signal.SIG_IGN)
     gc.collect()
     gc.freeze()
     with socket.socket(fileno=descriptor) as control:
