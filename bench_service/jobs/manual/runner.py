@@ -115,7 +115,7 @@ class ManualRunner:
         def stop_wanted() -> bool:
             return self._stopped() or reader.silent()
 
-        session = ManualSession(lease, bench, stop_wanted, self._board, reader.tell)
+        session = ManualSession(lease, bench, stop_wanted, self._board, reader.tell, self._stopped)
         self._session, self._reader = session, reader
         if self._ending.is_set():  # set while the bench was being opened, when there was no session to end
             session.shut_down()

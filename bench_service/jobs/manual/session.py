@@ -4,7 +4,6 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from datetime import datetime
 from functools import partial
 from math import inf
 from typing import Any
@@ -15,7 +14,7 @@ from bench_service.bench.live.values import PUBLISH_S, BenchLive, LiveBoard, Liv
 from bench_service.jobs.manual.demands import angles, constant_rate
 from bench_service.jobs.manual.sensors import UnitReadings
 from bench_service.model.manual import MOTIONS, Answer, DemandState, ManualDemand, ManualLease
-from bench_service.wall_clock import monotonic_s, now, pause_async
+from bench_service.wall_clock import monotonic_at_s, monotonic_s, now, pause_async
 from procedures.bench import Bench
 from procedures.bench.errors import BenchError, Disconnected, OutOfRange, Stopped
 from procedures.core.errors import BadParameter
@@ -36,16 +35,22 @@ class ManualSession(DrivenBench):
     """
 
     def __init__(
-        self, lease: ManualLease, bench: Bench, stop_wanted: Callable[[], bool], board: LiveBoard, tell: Tell
+        self,
+        lease: ManualLease,
+        bench: Bench,
+        stop_wanted: Callable[[], bool],
+        board: LiveBoard,
+        tell: Tell,
+        stop_stands: Callable[[], bool] = lambda: False,
     ) -> None:
         """Set up with `tell`, called in the bench's thread with what becomes of a demand; it must not wait."""
-        super().__init__(f"manual lease {lease.id}", bench, stop_wanted)
+        super().__init__(f"manual lease {lease.id}", bench, stop_wanted, stop_stands)
         self.lease = lease
         self._board, self._tell = board, tell
         self._readings = DeviceReadings(self._bench)
         self._sensors = UnitReadings(bench)
         self._over = asyncio.Event()
-        self._until_s = self._monotonic(lease.until)
+        self._until_s = monotonic_at_s(lease.until)
         self._publish_s = -inf
         self._ended_because = ""
         """The reason why no demand begins any more; empty: demands begin."""
@@ -54,8 +59,7 @@ class ManualSession(DrivenBench):
         self._tasks: set[asyncio.Task[None]] = set()
         self._motion: asyncio.Task[None] | None = None
         self._doing = ""
-        self._halts = 0
-        """Number of halts under way, during which no motion begins."""
+        self._halts = 0  # under way: no motion begins meanwhile
         self._order = asyncio.Lock()
         self._failure: BenchError | None = None
 
@@ -91,13 +95,11 @@ class ManualSession(DrivenBench):
     def expires(self, lease: ManualLease) -> None:
         """Take over the lease's end where it was moved, by a clock that is never set back; from any thread."""
         if lease.until != self.lease.until:
-            self._until_s = self._monotonic(lease.until)
+            self._until_s = monotonic_at_s(lease.until)
             self.lease = lease
 
     def demand(self, demand: ManualDemand) -> None:
-        """Carry out a demand; one that was given before is not repeated, and none once demands have ended.
-        From any thread.
-        """
+        """Carry out a demand, unless it was given before or demands have ended. From any thread."""
         try:
             self._loop.call_soon_threadsafe(self._begin, demand)
         except RuntimeError:  # the loop of a closed session
@@ -107,10 +109,6 @@ class ManualSession(DrivenBench):
     def expired(self) -> bool:
         """Whether the lease's time is over."""
         return monotonic_s() >= self._until_s
-
-    @staticmethod
-    def _monotonic(until: datetime) -> float:
-        return monotonic_s() + (until - now()).total_seconds()
 
     async def _life(self) -> None:
         try:
@@ -136,11 +134,10 @@ class ManualSession(DrivenBench):
         if self._tasks:
             _, left = await asyncio.wait(self._tasks, timeout=UNWIND_S)
             if left:
-                log.error("%s: %d of its demands could not be left within %g s", self._name, len(left), UNWIND_S)
+                log.error("%s: %d demands could not be left within %g s", self._name, len(left), UNWIND_S)
 
     async def _end(self) -> None:
-        """Leave demands before the devices' links are given back: none waits for an answer on a line that is gone."""
-        await self._leave()
+        await self._leave()  # before the devices' links are given back
         self._board.publish(BenchLive(self.lease.bench, now()))
 
     async def _pass(self) -> None:
@@ -174,7 +171,9 @@ class ManualSession(DrivenBench):
         if demand.id in self._seen:
             return
         self._seen.add(demand.id)
-        if self.expired:
+        if self._stop_stands():
+            self._end_demands(STOPPED)
+        elif self.expired:
             self._end_demands(TIME_OVER)
             self._over.set()
         if self._ended_because:
@@ -195,7 +194,7 @@ class ManualSession(DrivenBench):
         """The refusal of a motion that would begin beside another, or while a halt brakes the table; None: it may."""
         if self._halts:
             text = "a halt is under way: wait until it is done and the table rests"
-            return Answer(text, "kind", demand.kind, "a motion once the halt is done")
+            return Answer(text, "kind", demand.kind, "a motion after the halt")
         if self._moving():
             text = f"the table is moving ({self._doing}): halt it, or wait for its end; one motion at a time"
             return Answer(text, "kind", demand.kind, "halt")
