@@ -16,6 +16,11 @@ def monotonic_s() -> float:
     return time.monotonic()  # noqa: TID251  the one place
 
 
+def monotonic_at_s(moment: datetime) -> float:
+    """Reading of `monotonic_s` at a moment, counted from now: a clock that is set back later does not move it."""
+    return monotonic_s() + (moment - now()).total_seconds()
+
+
 def pause(seconds: float) -> None:
     """Wait in real time, in this thread."""
     time.sleep(seconds)  # noqa: TID251  the one place

@@ -72,3 +72,17 @@ def test_an_end_that_is_asked_for_before_it_began_is_one_at_once(stores: Stores)
     stores.manual.begin(LEASE)
     ended = stores.manual.ask_end("l1", "bob", NOW)
     assert (ended.ended_because, ended.safe) == ("ended by bob before it began", None)
+
+
+def test_a_lease_takes_no_demand_while_a_stop_stands_and_says_which(stores: Stores) -> None:
+    stores.manual.begin(LEASE)
+    stores.manual.demand(DEMAND, NOW)
+    stores.benches.stop_bench_once(BenchStop("annex", NOW, "another bench", by="bob"))
+    stores.manual.demand(replace(DEMAND, id="d2", key="before"), NOW)
+    stores.benches.stop_bench_once(BenchStop("sim", NOW, "smoke", by="bob"))
+    with pytest.raises(ManualRefused, match="bench sim is stopped: smoke; a person must look at it"):
+        stores.manual.demand(replace(DEMAND, id="d3", key="after"), NOW)
+    assert stores.manual.demand(DEMAND, NOW) == DEMAND  # a request that is repeated is answered as before
+    (stop,) = stores.benches.standing_stops("sim")
+    stores.benches.release_stop("sim", stop.id, NOW, "ann", "")
+    stores.manual.demand(replace(DEMAND, id="d3", key="after"), NOW)

@@ -22,6 +22,8 @@ from procedures.core.turn import Turn
 
 MOST_LEFT_DEG = 170.0
 """Largest angle between the stop of turns and their end: beyond it the shorter way would be another number of turns."""
+LEAVE_S = 0.5
+"""Time that a motion which is followed may take to be left [s, real time]."""
 
 
 class AcutrolTurntable(SwingingTable):
@@ -117,9 +119,10 @@ class AcutrolTurntable(SwingingTable):
     async def make_safe(self) -> None:
         """Ramp down to rest and hold, or with the servo off as `on_safe` says; see the port."""
         self._demand += 1
-        if self._turning is not None:
-            self._turning.cancel()
         self._busy = False
+        if (turning := self._turning) is not None:
+            turning.cancel()
+            await asyncio.wait([turning], timeout=LEAVE_S)  # its last statement, which brakes, before those from here
         if await self._rests():
             return
         longest = max(axis.rate_deg_s / axis.acceleration_deg_s2 for axis in self._axes())
@@ -187,8 +190,8 @@ class AcutrolTurntable(SwingingTable):
             states = await self._states()
             progress.read(states[index].position_deg, rested, not_turned)
             await self._return(turn, index, start, turn.angle_deg - progress.turned_deg, demand)
-        except BaseException:
-            await self._stop_axis(index)
+        except BaseException as failure:
+            await self._stop_unfollowed(index, self._link.demand("rate", index, 0.0), failure)
             raise
         finally:
             self._end(demand)
@@ -202,8 +205,8 @@ class AcutrolTurntable(SwingingTable):
             self._require_current(demand)
             await self._link.demand("position", index, (await self._link.states())[index].position_deg)
             await self._link.mode("position", [index])
-        except BaseException:
-            await self._stop_axis(index)
+        except BaseException as failure:
+            await self._stop_unfollowed(index, self._link.demand("rate", index, 0.0), failure)
             raise
         finally:
             self._end(demand)
@@ -236,13 +239,6 @@ class AcutrolTurntable(SwingingTable):
         await self._link.mode("position", [index])
         ends = [end if k == index else angle for k, angle in enumerate(start)]
         await self._wait_for_rest(ends, _duration_s(abs(left_deg), axis.rate_deg_s, axis.acceleration_deg_s2), demand)
-
-    async def _stop_axis(self, index: int) -> None:
-        """Take the rate away from an axis whose turns are not followed any more; quiet where that fails as well."""
-        try:
-            await asyncio.shield(self._link.demand("rate", index, 0.0))
-        except Exception:
-            return
 
 
 def _duration_s(distance_deg: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:

@@ -1,13 +1,16 @@
 """Watching of an ACUTROL table by its encoders: states, rest, one demand at a time, what took over from what."""
 
 import asyncio
+import logging
+from collections.abc import Coroutine
+from typing import Any
 
 from bench_service.drivers.devices.acutrol_link import AcutrolLink, AcutrolSection
 from bench_service.drivers.devices.table_axes import AXES, TurnCount, declared, wrapped
 from bench_service.drivers.interface.driver import DriverContext, narrowed
 from bench_service.drivers.protocols.acutrol import AxisState
 from procedures.bench.description import AxisLimits
-from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
+from procedures.bench.errors import DeviceFault, Disconnected, NotSettled, OutOfRange, Stopped
 
 POLL_S = 0.05
 """Time between two readings of a moving table [s]."""
@@ -19,12 +22,15 @@ STATUS_EVERY = 20
 """Number of readings of a motion after which the interlocks are read again."""
 STOPPED = "the table was stopped by another demand"
 
+log = logging.getLogger(__name__)
+
 
 class WatchedTable:
     """Table whose state is what its encoders say; knows no verb of the port."""
 
     def __init__(self, section: AcutrolSection, context: DriverContext) -> None:
         self._section, self._clock = section, context.clock
+        self._bench_id, self._note = context.bench_id, context.note
         self._link = AcutrolLink(section, context.note)
         self._counts = [
             TurnCount(section.encoder == "single_turn" and not getattr(section, name).continuous) for name in AXES
@@ -131,6 +137,22 @@ class WatchedTable:
         """Take the rate away from an axis: two statements."""
         await self._link.demand("rate", index, 0.0)
         await self._link.mode("rate", [index])
+
+    async def _stop_unfollowed(self, index: int, stopping: Coroutine[Any, Any, None], failure: BaseException) -> None:
+        """Send the statements that stop an axis which is not followed any more, because of a failure.
+
+        Raises `Disconnected` or `DeviceFault` naming both failures where they fail too. After a cancel, or where
+        another demand took over, that is logged and written to the journal: whoever did that stops the axis.
+        """
+        try:
+            await asyncio.shield(stopping)
+        except Exception as error:
+            text = f"the {AXES[index]} axis could not be stopped: {error}"
+            log.error("the turntable of bench %s: %s", self._bench_id, text)
+            self._note("turntable.not_stopped", {"axis": AXES[index], "error": str(error)})
+            if isinstance(failure, Exception) and not isinstance(failure, Stopped):
+                kind = Disconnected if isinstance(error, Disconnected) else DeviceFault
+                raise kind(f"{failure}; {text}") from error
 
     def _demanded(self, index: int, angle_deg: float, here_deg: float) -> float:
         """Angle as the controller takes it, for an axis that reads `here_deg`: of one turn where its encoder is so.

@@ -6,7 +6,7 @@ the lease ends; so it does where no process that answers clients has given a sig
 
 import logging
 from queue import SimpleQueue
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 
 from bench_service.bench.driven import HANGS_S
 from bench_service.jobs.manual.presence import SILENT_S
@@ -30,6 +30,9 @@ class LeaseReader:
         self._told: SimpleQueue[tuple[ManualDemand, DemandState, Answer]] = SimpleQueue()
         self._unwritten: tuple[ManualDemand, DemandState, Answer] | None = None
         self._over = Event()
+        self._delivery = Lock()
+        """Held while demands are given to the session, and while that is ended."""
+        self._delivering = True
         self._answered_s = self._heard_s = monotonic_s()
         self._heard = -1
         self._thread: Thread | None = None
@@ -53,6 +56,11 @@ class LeaseReader:
         self.because = self.because or f"the database has not answered for {HANGS_S:g} s"
         return True
 
+    def end_delivery(self) -> None:
+        """Give the session no demand from here on; outcomes are still written. A later call does nothing."""
+        with self._delivery:
+            self._delivering = False
+
     def end(self, within_s: float) -> None:
         """Write the last outcomes, and end the thread; what is not written in time is left to the end of the lease."""
         self._over.set()
@@ -72,6 +80,10 @@ class LeaseReader:
                 self._look(session, news)
             except ServiceError as error:
                 log.warning("manual lease %s: %s", self._lease_id, error)
+                if last:
+                    return
+            except Exception:  # of whatever kind: a reader that ended would see neither a stop nor the lease's end
+                log.exception("manual lease %s", self._lease_id)
                 if last:
                     return
             self._wake.wait(LOOK_S)
@@ -94,8 +106,9 @@ class LeaseReader:
         elif monotonic_s() - self._heard_s > SILENT_S:
             self.because = f"no process that serves clients has given a heartbeat for {SILENT_S:g} s"
         if self.because:
-            session.leave()
+            session.leave(self.because)
             return
         session.expires(news.lease)
-        for demand in news.demands:
-            session.demand(demand)
+        with self._delivery:
+            for demand in news.demands if self._delivering else ():
+                session.demand(demand)

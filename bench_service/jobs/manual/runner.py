@@ -5,7 +5,7 @@ The dispatcher calls `run` where it would run a job, in its own thread, so no jo
 
 import logging
 from collections.abc import Callable
-from threading import Event
+from threading import Event, Lock
 
 from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import BenchDriver
@@ -13,7 +13,7 @@ from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import RoadEnd, over_new_link, whole_road
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.jobs.manual.reader import LeaseReader
-from bench_service.jobs.manual.session import ManualSession
+from bench_service.jobs.manual.session import TIME_OVER, ManualSession
 from bench_service.jobs.stores import JobStores
 from bench_service.model.errors import ServiceError
 from bench_service.model.manual import ManualLease
@@ -47,6 +47,9 @@ class ManualRunner:
         self._stopped = stopped
         self._by = f"the worker, {ProcessIdentity.own()}"
         self._session: ManualSession | None = None
+        self._reader: LeaseReader | None = None
+        self._road = Lock()
+        """Held while a thread makes the bench of a lease safe: the stop guard's or the lease's own."""
         self._wake = Event()
         self._ending = Event()
         self._idle = Event()
@@ -86,6 +89,8 @@ class ManualRunner:
         if session is None:
             return
         session.stop()
+        if (reader := self._reader) is not None:
+            reader.end_delivery()
         if self._driver.device_state() is not None:  # else the session's own link is the only one
             self._whole_road(session)
 
@@ -110,8 +115,8 @@ class ManualRunner:
         def stop_wanted() -> bool:
             return self._stopped() or reader.silent()
 
-        session = ManualSession(lease, bench, stop_wanted, self._board, reader.tell)
-        self._session = session
+        session = ManualSession(lease, bench, stop_wanted, self._board, reader.tell, self._stopped)
+        self._session, self._reader = session, reader
         if self._ending.is_set():  # set while the bench was being opened, when there was no session to end
             session.shut_down()
         log.info("bench %s is in manual mode by %s until %s: %s", lease.bench, lease.holder, lease.until, lease.reason)
@@ -119,7 +124,7 @@ class ManualRunner:
         because, ending = "", False
         try:
             session.hold()
-            because = reader.because or "its time has ended"
+            because = reader.because or TIME_OVER
         except Stopped:
             because = reader.because or "the bench was stopped"
         except ShuttingDown:
@@ -127,6 +132,7 @@ class ManualRunner:
         except (BenchError, ServiceError) as error:
             because = f"{type(error).__name__}: {error}"
         finally:
+            reader.end_delivery()
             end = self._whole_road(session)
             reader.end(WRITE_S)
         detour = f"; made safe over a new link: {end.detour}" if end.detour else ""
@@ -139,10 +145,28 @@ class ManualRunner:
             if self._session is session:
                 self._session = None
 
-        return whole_road(session, self._driver, self._by, given_back)
+        with self._road:
+            return whole_road(session, self._driver, self._by, given_back)
+
+    def _read_back(self) -> str | None:
+        """The reason why the devices' register does not say that they are safe; None: it does, or there is none.
+
+        It is read once nothing of the lease can reach a device. Devices that are not safe then, though the way to
+        safety ended well, are made safe over a new link; the bench is stopped all the same, as nobody knows the cause.
+        """
+        state = self._driver.device_state()
+        if state is None or state.safe:
+            return None
+        obstacle = over_new_link(self._driver, self._by)
+        then = "a new link has made it safe since" if obstacle is None else obstacle.why
+        return f"at the end of manual mode {' and '.join(state.unsafe)}; {then}"
 
     def _ended(self, lease: ManualLease, because: str, unsafe: str | None) -> None:
-        """Note the end of a lease; where the bench is not safe it is stopped. What is not noted now is closed later."""
+        """Note the end of a lease; where the bench is not safe it is stopped. What is not noted now is closed later.
+
+        It is noted as safe only where the devices' register says so now.
+        """
+        unsafe = self._read_back() if unsafe is None else unsafe
         log.info("manual mode of bench %s has ended: %s", lease.bench, because)
         if unsafe is not None:
             log.error("bench %s could not be made safe: %s", lease.bench, unsafe)

@@ -104,7 +104,7 @@ class ManualService:
         """Accept a demand within the bench's limits; the worker carries it out.
 
         Raises `BadParameter` with field, value and range, `NotAllowed` for another than the lease's holder,
-        `ManualRefused`, `IdempotencyConflict`.
+        `ManualRefused` once the lease has ended and while the bench is stopped, `IdempotencyConflict`.
         """
         lease = self.lease(bench_id, lease_id)
         _require_holder(lease, holder)

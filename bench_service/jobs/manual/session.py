@@ -3,47 +3,63 @@
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
-from datetime import datetime
+from contextlib import suppress
+from functools import partial
 from math import inf
 from typing import Any
 
-from bench_service.bench.driven import UNWIND_S, DrivenBench
+from bench_service.bench.driven import STOPPED, UNWIND_S, DrivenBench
 from bench_service.bench.live.devices import DeviceReadings
 from bench_service.bench.live.values import PUBLISH_S, BenchLive, LiveBoard, LiveManual
 from bench_service.jobs.manual.demands import angles, constant_rate
 from bench_service.jobs.manual.sensors import UnitReadings
 from bench_service.model.manual import MOTIONS, Answer, DemandState, ManualDemand, ManualLease
-from bench_service.wall_clock import monotonic_s, now, pause_async
+from bench_service.wall_clock import monotonic_at_s, monotonic_s, now, pause_async
 from procedures.bench import Bench
 from procedures.bench.errors import BenchError, Disconnected, OutOfRange, Stopped
 from procedures.core.errors import BadParameter
 
 TICK_S = 0.1
 """Time that passes between two looks at the lease, of bench and real time alike [s]."""
+TIME_OVER, LEFT = "its time has ended", "the bench is being made safe"
 
 log = logging.getLogger(__name__)
 Tell = Callable[[ManualDemand, DemandState, Answer], object]
 
 
 class ManualSession(DrivenBench):
-    """Carries out demands until `leave`, a stop, or the end of the lease's time, which depends on no database."""
+    """Carries out demands until `leave`, a stop, or the end of the lease's time, which depends on no database.
+
+    Demands begin in the bench's loop. `_leave` ends that and cancels what is under way in one step of it, before any
+    device is made safe: no demand is carried out during or after the way to safety.
+    """
 
     def __init__(
-        self, lease: ManualLease, bench: Bench, stop_wanted: Callable[[], bool], board: LiveBoard, tell: Tell
+        self,
+        lease: ManualLease,
+        bench: Bench,
+        stop_wanted: Callable[[], bool],
+        board: LiveBoard,
+        tell: Tell,
+        stop_stands: Callable[[], bool] = lambda: False,
     ) -> None:
         """Set up with `tell`, called in the bench's thread with what becomes of a demand; it must not wait."""
-        super().__init__(f"manual lease {lease.id}", bench, stop_wanted)
+        super().__init__(f"manual lease {lease.id}", bench, stop_wanted, stop_stands)
         self.lease = lease
         self._board, self._tell = board, tell
         self._readings = DeviceReadings(self._bench)
         self._sensors = UnitReadings(bench)
         self._over = asyncio.Event()
-        self._until_s = self._monotonic(lease.until)
+        self._until_s = monotonic_at_s(lease.until)
         self._publish_s = -inf
+        self._ended_because = ""
+        """The reason why no demand begins any more; empty: demands begin."""
         self._seen: set[str] = set()
+        self._begun: set[str] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self._motion: asyncio.Task[None] | None = None
         self._doing = ""
+        self._halts = 0  # under way: no motion begins meanwhile
         self._order = asyncio.Lock()
         self._failure: BenchError | None = None
 
@@ -51,31 +67,48 @@ class ManualSession(DrivenBench):
         """Hold the bench until the lease ends. Raises `Stopped`, `Disconnected`, `ShuttingDown`, `StorageFailure`."""
         self._run(self._life())
 
-    def leave(self) -> None:
-        """Make `hold` return; from any thread."""
-        self._loop.call_soon_threadsafe(self._over.set)
+    def leave(self, because: str) -> None:
+        """Make `hold` return, and begin no demand any more; from any thread, also once the session is closed."""
+        self._end_demands(because)
+        with suppress(RuntimeError):  # the loop of a closed session
+            self._loop.call_soon_threadsafe(self._over.set)
+
+    def stop(self) -> None:
+        """Stop as any driven bench; no demand begins from here on."""
+        self._end_demands(STOPPED)
+        super().stop()
+
+    def shut_down(self) -> None:
+        """Shut down as any driven bench; no demand begins from here on."""
+        self._end_demands("the service ended")
+        super().shut_down()
+
+    def make_safe(self) -> None:
+        """Make safe as any driven bench; no demand begins from here on, also where its thread does not come back."""
+        self._end_demands(LEFT)
+        super().make_safe()
+
+    def _end_demands(self, because: str) -> None:
+        """Begin no demand from here on; the first reason stays. From any thread."""
+        self._ended_because = self._ended_because or because
 
     def expires(self, lease: ManualLease) -> None:
-        """Take over the lease's end where it was moved; from any thread.
-
-        It is counted from this moment by a clock that is never set back.
-        """
+        """Take over the lease's end where it was moved, by a clock that is never set back; from any thread."""
         if lease.until != self.lease.until:
-            self._until_s = self._monotonic(lease.until)
+            self._until_s = monotonic_at_s(lease.until)
             self.lease = lease
 
     def demand(self, demand: ManualDemand) -> None:
-        """Carry out a demand; one that was given before is not repeated. From any thread."""
-        self._loop.call_soon_threadsafe(self._begin, demand)
+        """Carry out a demand, unless it was given before or demands have ended. From any thread."""
+        try:
+            self._loop.call_soon_threadsafe(self._begin, demand)
+        except RuntimeError:  # the loop of a closed session
+            self._not_begun(demand)
 
     @property
     def expired(self) -> bool:
         """Whether the lease's time is over."""
         return monotonic_s() >= self._until_s
-
-    @staticmethod
-    def _monotonic(until: datetime) -> float:
-        return monotonic_s() + (until - now()).total_seconds()
 
     async def _life(self) -> None:
         try:
@@ -86,17 +119,25 @@ class ManualSession(DrivenBench):
                 if monotonic_s() >= self._publish_s:
                     self._publish_s = monotonic_s() + PUBLISH_S
                     await self._publish()
+            self._end_demands(TIME_OVER)
+        except BenchError as failure:
+            self._end_demands(str(failure))
+            raise
         finally:
             await self._leave()
 
     async def _leave(self) -> None:
-        """Cancel what is under way: it is not carried on while the devices are made safe."""
+        """End demands and cancel what is under way: nothing is carried on while the devices are made safe."""
+        self._end_demands(LEFT)
         for task in self._tasks:
             task.cancel()
         if self._tasks:
-            await asyncio.wait(self._tasks, timeout=UNWIND_S)
+            _, left = await asyncio.wait(self._tasks, timeout=UNWIND_S)
+            if left:
+                log.error("%s: %d demands could not be left within %g s", self._name, len(left), UNWIND_S)
 
     async def _end(self) -> None:
+        await self._leave()  # before the devices' links are given back
         self._board.publish(BenchLive(self.lease.bench, now()))
 
     async def _pass(self) -> None:
@@ -119,34 +160,60 @@ class ManualSession(DrivenBench):
         self._sensors.powered(devices.unit_on)
         lease, sensors = self.lease, self._sensors
         manual = LiveManual(
-            lease.id,
-            lease.holder,
-            lease.reason,
-            lease.until,
+            *(lease.id, lease.holder, lease.reason, lease.until),
             self._bench.clock.now_s(),
             self._doing if self._moving() else "",
-            sensors.values,
-            sensors.at_s,
-            sensors.problem,
+            *(sensors.values, sensors.at_s, sensors.problem),
         )
         self._board.publish(BenchLive(lease.bench, now(), devices=devices, manual=manual))
 
     def _begin(self, demand: ManualDemand) -> None:
-        if demand.id in self._seen or self._over.is_set():
+        if demand.id in self._seen:
             return
         self._seen.add(demand.id)
+        if self._stop_stands():
+            self._end_demands(STOPPED)
+        elif self.expired:
+            self._end_demands(TIME_OVER)
+            self._over.set()
+        if self._ended_because:
+            self._not_begun(demand)
+            return
         moves = demand.kind in MOTIONS
-        if moves and self._moving():
-            text = f"the table is moving ({self._doing}): halt it, or wait for its end; one motion at a time"
-            self._tell(demand, DemandState.REFUSED, Answer(text, "kind", demand.kind, "halt"))
+        if moves and (refusal := self._motion_refusal(demand)) is not None:
+            self._tell(demand, DemandState.REFUSED, refusal)
             return
         task = self._loop.create_task(self._do(demand))
         self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(partial(self._over_with, demand))
+        self._halts += demand.kind == "halt"
         if moves:
             self._motion, self._doing = task, demand.kind
 
+    def _motion_refusal(self, demand: ManualDemand) -> Answer | None:
+        """The refusal of a motion that would begin beside another, or while a halt brakes the table; None: it may."""
+        if self._halts:
+            text = "a halt is under way: wait until it is done and the table rests"
+            return Answer(text, "kind", demand.kind, "a motion after the halt")
+        if self._moving():
+            text = f"the table is moving ({self._doing}): halt it, or wait for its end; one motion at a time"
+            return Answer(text, "kind", demand.kind, "halt")
+        return None
+
+    def _not_begun(self, demand: ManualDemand) -> None:
+        text = f"the lease has ended: {self._ended_because or LEFT}; nothing was commanded"
+        self._tell(demand, DemandState.STOPPED, Answer(text))
+
+    def _over_with(self, demand: ManualDemand, task: "asyncio.Task[None]") -> None:
+        """Forget a task that is over; one that was cancelled before its first step has not said so itself."""
+        self._tasks.discard(task)
+        self._halts -= demand.kind == "halt"
+        if demand.id not in self._begun:
+            text = "a halt, a stop or the end of the lease came first; nothing was commanded"
+            self._tell(demand, DemandState.STOPPED, Answer(text))
+
     async def _do(self, demand: ManualDemand) -> None:
+        self._begun.add(demand.id)
         self._tell(demand, DemandState.DOING, Answer())
         state, answer = DemandState.DONE, Answer()
         try:
@@ -160,6 +227,7 @@ class ManualSession(DrivenBench):
             state, answer = DemandState.STOPPED, Answer(str(stopped))
         except Disconnected as lost:  # whether a demand was carried out is not known: the bench is made safe
             state, answer, self._failure = DemandState.FAILED, Answer(str(lost)), lost
+            self._end_demands(str(lost))
         except BenchError as failure:
             state, answer = DemandState.FAILED, Answer(str(failure))
         except asyncio.CancelledError:

@@ -69,8 +69,8 @@ class ManualStore(Protocol):
     def demand(self, demand: ManualDemand, at: datetime) -> ManualDemand:
         """Store a demand; the one that its key made before is returned instead.
 
-        Raises `IdempotencyConflict` for a key of another demand, `ManualRefused` where the lease does not live or too
-        many demands wait.
+        Raises `IdempotencyConflict` for a key of another demand, `ManualRefused` where the lease does not live, where
+        the bench is stopped, or where too many demands wait.
         """
         ...
 

@@ -125,7 +125,9 @@ class SqlManualStore:
                     if (made.kind, made.values) != (demand.kind, demand.values):
                         raise IdempotencyConflict(f"the key {demand.key!r} was used before with another demand")
                     return made
-                _require_live(lease_of_row(_found(session, demand.lease)), at)
+                lease = lease_of_row(_found(session, demand.lease))
+                _require_live(lease, at)
+                _require_not_stopped(session, lease.bench)
                 waiting = select(func.count()).where(
                     ManualDemandRow.lease == demand.lease, ManualDemandRow.state == DemandState.ACCEPTED.value
                 )
@@ -182,10 +184,7 @@ def _require_free(session: Session, lease: ManualLease) -> None:
     running = select(JobRow.id).where(JobRow.bench == lease.bench, JobRow.state == JobState.RUNNING.value)
     if (job := session.scalar(running)) is not None:
         raise ManualRefused(f"job {job} drives bench {lease.bench}: cancel it, or wait for its end")
-    if stops := standing_stops(session, lease.bench):
-        raise ManualRefused(
-            f"bench {lease.bench} is stopped: {reasons_of(stops)}; a person must look at it and release it"
-        )
+    _require_not_stopped(session, lease.bench)
     active = active_reservations(session, lease.created_at)
     mine = next((r for r in active if r.id == lease.reservation), None)
     for reservation in active:
@@ -195,6 +194,11 @@ def _require_free(session: Session, lease: ManualLease) -> None:
                 f"{reservation.kind.value} {name} is reserved by {reservation.holder} until "
                 f"{reservation.until.isoformat()}: give that reservation's id, or wait for its end"
             )
+
+
+def _require_not_stopped(session: Session, bench: str) -> None:
+    if stops := standing_stops(session, bench):
+        raise ManualRefused(f"bench {bench} is stopped: {reasons_of(stops)}; a person must look at it and release it")
 
 
 def _require_live(lease: ManualLease, at: datetime) -> None:
