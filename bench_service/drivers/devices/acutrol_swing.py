@@ -92,8 +92,7 @@ class SwingingTable(WatchedTable):
                 wanted = f"{sinusoid.amplitude_deg:g} deg"
                 raise DeviceFault(f"the {sinusoid.axis} axis swung by {largest:.4g} deg where {wanted} were demanded")
         except BaseException:
-            if demand == self._demand:  # else whoever took over stops it
-                await self._stop_quietly(index)
+            await self._stop_unless_taken_over(index, demand)
             raise
         finally:
             self._end(demand)
@@ -125,10 +124,3 @@ class SwingingTable(WatchedTable):
         await self._link.demand("position", index, self._demanded(index, start[index], start[index]))
         await self._link.mode("position", [index])
         await self._wait_for_rest(start, 1.0, demand)
-
-    async def _stop_quietly(self, index: int) -> None:
-        """Take the rate away from an axis that is not followed any more; quiet where that fails as well."""
-        try:
-            await asyncio.shield(self._stop_at_rate(index))
-        except Exception:
-            return

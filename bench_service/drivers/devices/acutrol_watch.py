@@ -25,6 +25,7 @@ class WatchedTable:
 
     def __init__(self, section: AcutrolSection, context: DriverContext) -> None:
         self._section, self._clock = section, context.clock
+        self._note = context.note
         self._link = AcutrolLink(section, context.note)
         self._counts = [
             TurnCount(section.encoder == "single_turn" and not getattr(section, name).continuous) for name in AXES
@@ -131,6 +132,18 @@ class WatchedTable:
         """Take the rate away from an axis: two statements."""
         await self._link.demand("rate", index, 0.0)
         await self._link.mode("rate", [index])
+
+    async def _stop_unless_taken_over(self, index: int, demand: int) -> None:
+        """Brake an axis that is not followed any more, unless another demand took over, which stops it by itself.
+
+        A failure is noted and not raised: the caller raises the reason why the axis is not followed.
+        """
+        if demand != self._demand:
+            return
+        try:
+            await asyncio.shield(self._stop_at_rate(index))
+        except Exception as failure:
+            self._note("turntable.not_stopped", {"axis": AXES[index], "why": str(failure)})
 
     def _demanded(self, index: int, angle_deg: float, here_deg: float) -> float:
         """Angle as the controller takes it, for an axis that reads `here_deg`: of one turn where its encoder is so.
