@@ -64,10 +64,6 @@ class StopAt(Parameters):
         rule = StopRule(tuple(targets), self.check_s, self.level)
         return self.model_copy(update={"rule": rule})
 
-    def expected_s(self, longest_s: float) -> float:
-        """Duration of a dwell to plan with [s]: that of the declared noise."""
-        return longest_s if self.rule is None else expected_s(self.rule, longest_s)
-
     def warnings(self, longest_s: float) -> tuple[str, ...]:
         """Targets that the longest dwell does not reach by the unit's noise."""
         beyond = [t for t in (self.rule.targets if self.rule else ()) if mean_sd(t.noise, longest_s) > t.target_sd]

@@ -10,6 +10,7 @@ from bench_service.evidence.units import UnitStore
 from bench_service.model.errors import NotFound, NotMounted
 from bench_service.model.mountings import StoredMounting
 from bench_service.wall_clock import now
+from procedures.analysis.response.trace import ENCODER_CHANNELS
 from procedures.bench import BenchDescription
 from procedures.core.errors import BadParameter, ProcedureDefect
 from procedures.core.recording import Station
@@ -21,8 +22,6 @@ BYTES_PER_SAMPLE = 2
 
 TEMPERATURE_CHANNELS = 7
 """Five sensors of the unit and two readings of the chamber, added to the triads where a station wants temperatures."""
-ENCODER_CHANNELS = 5
-"""Readings of the table, added where a station follows a sinusoid."""
 
 
 @dataclass(frozen=True)
@@ -163,5 +162,5 @@ def _samples(station: Station, unit: Unit) -> int:
         return round(station.record_s * (station.sample_rate_hz or unit.sample_rate_hz)) * 4
     seconds = station.record_s if station.profile is None else station.profile.expected_s()
     channels = len(unit.channels) + TEMPERATURE_CHANNELS * station.temperatures
-    channels += ENCODER_CHANNELS * (station.sinusoid is not None)
+    channels += len(ENCODER_CHANNELS) * (station.sinusoid is not None)
     return round(seconds * (station.sample_rate_hz or unit.sample_rate_hz)) * channels

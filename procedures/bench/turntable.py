@@ -105,7 +105,8 @@ class Turntable(Device, Protocol):
     async def make_safe(self) -> None:
         """Ramp down to rest and lock, from any motion; returns once the encoders show rest.
 
-        A table at rest gets no command. Raises `DeviceFault`, `Disconnected`.
+        A table at rest gets no command, unless an axis is in a mode that is to move it. Raises `DeviceFault`,
+        `Disconnected`.
         """
         ...
 

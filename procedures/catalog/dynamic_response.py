@@ -47,6 +47,8 @@ Frequency = Annotated[float, Field(ge=0.01, le=1000.0)]
 Amplitude = Annotated[float, Field(gt=0.0, le=180.0)]
 HIGHEST_SHARE = 0.4
 """Share of the sample rate that a frequency may have: half of it is where samples tell no sinusoid apart."""
+MOST_WITHIN_S = 100.0
+"""Largest half interval of a reading, that of the slowest reading [s]."""
 
 
 class Limits(Parameters):
@@ -82,7 +84,16 @@ class Params(JudgedParameters):
         0.0, ge=0.0, le=1.0, description="of the encoder's readings beyond the question's interval, alike for all"
     )
     encoder_sd_arcsec: float = Field(0.1, gt=0.0, le=3600.0, description="of one reading, for the preview alone")
-    encoder_rate_hz: float = Field(50.0, gt=0.0, le=1e5, description="readings a second, for the preview alone")
+    encoder_rate_hz: float = Field(
+        50.0, ge=0.5 / MOST_WITHIN_S, le=1e5, description="readings a second, for the preview alone"
+    )
+    encoder_within_s: float | None = Field(
+        None,
+        ge=0.0,
+        le=MOST_WITHIN_S,
+        description="half the interval in which a reading is taken, for the preview alone; null: half the time from "
+        "one reading to the next, 0 for a table that is simulated in process, whose readings are exact",
+    )
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 
@@ -93,13 +104,15 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Amplitudes from the limits of the outer axis."""
+    """Amplitudes from the limits of the outer axis; the interval of a reading from its rate."""
     outer = context.bench.outer
     amplitudes = tuple(
         float(f"{largest_amplitude_deg(f, outer.rate_deg_s, outer.acceleration_deg_s2):.4g}")
         for f in params.frequencies_hz
     )
-    return params.filled({"amplitudes_deg": amplitudes})
+    over_a_line = any(device.name == "turntable" and device.address for device in context.bench.devices)
+    within_s = 0.5 / params.encoder_rate_hz if over_a_line else 0.0
+    return params.filled({"amplitudes_deg": amplitudes, "encoder_within_s": within_s})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -120,11 +133,14 @@ def predict(params: Params, context: Context) -> Prediction:
         return Prediction(duration_s, (), ("the noise of the gyro triad is not known: nothing is predicted",))
     linearity = params.linearity_ppm * units.PPM
     noise, rate_hz = context.unit.gyro.noise, context.unit.sample_rate_hz
-    whole = predicted_lags(program, noise, rate_hz, _encoder(params), linearity)
+    encoder = EncoderQuality(params.encoder_sd_arcsec, params.encoder_rate_hz)
+    within_s = params.encoder_within_s or 0.0
+    time_sd_s = hypot(within_s / sqrt(3.0), params.encoder_time_sd_s)
+    whole = predicted_lags(program, noise, rate_hz, encoder, linearity)
     alone = predicted_lags(program, noise, rate_hz, None, linearity)
     found: list[PredictedUncertainty] = []
     for axis, lag, of_gyro in zip(params.axes, whole, alone, strict=True):
-        sd, noise_sd = hypot(lag.delay_sd_s, params.encoder_time_sd_s), of_gyro.delay_sd_s
+        sd, noise_sd = hypot(lag.delay_sd_s, time_sd_s), of_gyro.delay_sd_s
         rest = sqrt(max(0.0, sd**2 - noise_sd**2))
         found.append(PredictedUncertainty(f"gyro.delay_{axis}", "s", sd, noise_sd, rest, DELAY.format(axis)))
         gain, of_noise = sqrt(lag.covariance[0, 0]), sqrt(of_gyro.covariance[0, 0])
@@ -133,7 +149,8 @@ def predict(params: Params, context: Context) -> Prediction:
     least = min(lag.bandwidth_above_hz for lag in whole)
     basis = (
         f"noise of the unit's record and an encoder of {params.encoder_sd_arcsec:g} arcsec read "
-        f"{params.encoder_rate_hz:g} times a second; a unit without a lag would be told to have a bandwidth above "
+        f"{params.encoder_rate_hz:g} times a second, each reading taken within ±{1e3 * within_s:g} ms, alike for all; "
+        f"a unit without a lag would be told to have a bandwidth above "
         f"{least:.3g} Hz; stamps that scatter from recording to recording are not predicted"
     )
     return Prediction(duration_s, tuple(found), (), basis)
@@ -179,10 +196,6 @@ def _program(params: Params) -> ResponseProgram:
         *(params.axes, params.frequencies_hz, params.amplitudes_deg),
         *(params.record_s, params.slack_s, params.settle_s),
     )
-
-
-def _encoder(params: Params) -> EncoderQuality:
-    return EncoderQuality(params.encoder_sd_arcsec, params.encoder_rate_hz, params.encoder_time_sd_s)
 
 
 def _require_possible(params: Params, context: Context) -> None:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from procedures.bench.errors import DeviceFault, OutOfRange, Stopped
+from procedures.bench.errors import DeviceFault, Disconnected, OutOfRange, Stopped
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from tests.conformance.tables import IMPLEMENTATIONS, TableRig, acutrol, table
@@ -83,6 +84,69 @@ def test_made_safe_in_mid_swing_it_rests_and_moves_again(rig: TableRig) -> None:
         await rig.port.move_to(TableAngles(1, 0, 0))
 
     asyncio.run(scene())
+
+
+SLOW = Sinusoid("outer", 2.5, 0.02, 3)
+"""Its rate is below that of rest for about two seconds after its begin."""
+CREEP = ConstantRate("outer", 0.02, 400.0, 100.0)
+"""Its rate is below that of rest for about five seconds after its begin."""
+
+
+@pytest.mark.parametrize("verb", ["sinusoid", "rate"])
+def test_made_safe_while_it_hardly_moves_yet_it_stays_where_it_is(rig: TableRig, verb: str) -> None:
+    """Ten seconds after its begin the sinusoid would be 0.14 deg away, the rate 0.01 deg."""
+
+    async def scene() -> None:
+        await (rig.port.command_sinusoid(SLOW) if verb == "sinusoid" else rig.port.command_rate(CREEP))
+        await rig.port.make_safe()
+        before = (await rig.port.read()).angles.outer_deg
+        await rig.clock.sleep(10.0)
+        assert (await rig.port.read()).angles.outer_deg == pytest.approx(before, abs=2e-3)
+        assert max(abs(rate) for rate in rig.rates_deg_s()) < 1e-4
+        if rig.served is not None:
+            assert rig.served.do(lambda bench: [axis.mode for axis in bench.table.axes]) == ["position"] * 3
+        await rig.port.move_to(TableAngles(1, 0, 0))
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.005, 0.01, 0.015, 0.02, 0.03])
+def test_a_sinusoid_that_is_still_being_demanded_does_not_outlive_make_safe(tmp_path: Path, after_s: float) -> None:
+    async def scene(rig: TableRig) -> None:
+        await rig.port.read()
+        begun = asyncio.create_task(rig.port.command_sinusoid(SWING))
+        await asyncio.sleep(after_s)
+        await rig.port.make_safe()
+        await asyncio.wait([begun])
+        await rig.clock.sleep(2.0)
+        assert max(abs(rate) for rate in rig.rates_deg_s()) < 1e-3
+        await rig.port.move_to(TableAngles(1, 0, 0))
+
+    with table("acutrol", tmp_path, sinusoidal=True) as rig:
+        asyncio.run(scene(rig))
+
+
+@pytest.mark.parametrize("verb", ["sinusoid", "rate"])
+def test_an_axis_that_can_be_neither_followed_nor_braked_is_noted(
+    tmp_path: Path, verb: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    notes: list[tuple[str, Any]] = []
+
+    async def lost(*_: Any) -> Any:
+        raise Disconnected("the line is cut")
+
+    async def scene(rig: TableRig) -> None:
+        device: Any = rig.port
+        monkeypatch.setattr(device, "_note", lambda event, more: notes.append((event, more)))
+        await (device.command_sinusoid(SWING) if verb == "sinusoid" else device.command_rate(CREEP))
+        for name in ("states", "demand"):
+            monkeypatch.setattr(device._link, name, lost)
+        with pytest.raises(Disconnected, match="the line is cut"):
+            await device.settle()
+        assert notes == [("turntable.not_stopped", {"axis": "outer", "error": "the line is cut"})]
+
+    with table("acutrol", tmp_path, sinusoidal=True) as rig:
+        asyncio.run(scene(rig))
 
 
 def test_another_process_stops_an_axis_that_stands_still_where_it_turns(tmp_path: Path) -> None:

@@ -6,6 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from procedures.analysis.response.fit import LEVEL, fit_lags, gain_p_value
+from procedures.analysis.response.phasors import Response
+from procedures.analysis.response.trace import TIME_STEP_S
+from procedures.bench.declared_device import DeclaredDevice
 from procedures.catalog import discover
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Verdict
@@ -91,6 +95,46 @@ def test_stamps_that_scatter_are_said_and_widen_the_delay(context: Context) -> N
     assert result.verdict is Verdict.FAIL
 
 
+def answers(gains: Any, phases: Any, frequencies: Any = FREQUENCIES, sd: float = 1e-4) -> list[Response]:
+    """Responses with given ln gains and phases [rad], known to `sd` each."""
+    values = np.exp(np.asarray(gains) + 1j * np.asarray(phases))
+    return [
+        Response(f"x {f:g} Hz", f, 0.01, complex(v), sd, sd, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+        for f, v in zip(frequencies, values, strict=True)
+    ]
+
+
+def test_gains_that_misfit_make_no_scatter_of_the_stamps() -> None:
+    """Phases of pure noise show a scatter once in 1000 trials: three of 40 come by chance but once in 10⁵."""
+    rng, sd = np.random.default_rng(8), 1e-4
+    found = [
+        fit_lags({"gyro_x": answers(1e-3 * rng.standard_normal(5), sd * rng.standard_normal(5), sd=sd)}, 0.0)
+        for _ in range(40)
+    ]
+    assert sum(lags.scatter_s > 0.0 for lags in found) < 3
+    p_values = [p for lags in found if (p := gain_p_value(lags.lags[0])) is not None]
+    assert len(p_values) == 40
+    assert np.median(p_values) < LEVEL
+
+
+def test_phases_that_misfit_are_found_beside_good_gains() -> None:
+    """At a scatter of 1 ms phases misfit by up to 0.05 rad, 500 times their noise; gains are the model's."""
+    rng = np.random.default_rng(9)
+    omega = 2.0 * np.pi * np.array(FREQUENCIES)
+    lags = fit_lags({"gyro_x": answers(np.zeros(5), omega * 1e-3 * rng.standard_normal(5))}, 0.0)
+    # s²·χ²(4)/4 lies within 0.15 … 2.5 of s but once in 10⁴.
+    assert 0.15e-3 < lags.scatter_s < 2.5e-3
+    assert lags.p_value_without is not None
+    assert lags.p_value_without < LEVEL
+
+
+def test_stamps_that_scatter_by_seconds_are_refused_with_the_channel() -> None:
+    slow = (0.01, 0.013, 0.017, 0.02, 0.025)
+    late = 2.0 * np.pi * np.array(slow) * np.array([6.0, -6.0, 6.0, -6.0, 6.0])
+    with pytest.raises(UnfitRecording, match=r"gyro_y: the delay differs .* by more than 1 s"):
+        fit_lags({"gyro_x": answers(np.zeros(5), np.zeros(5), slow), "gyro_y": answers(np.zeros(5), late, slow)}, 0.0)
+
+
 def test_another_clock_is_said(context: Context) -> None:
     result = analysed(context, SwungUnit(clock_ppm=80.0))
     found = result.gyro.channels[0]
@@ -166,6 +210,28 @@ def test_what_cannot_be_swung_or_seen_is_refused_beforehand(
     with pytest.raises(BadParameter, match=words) as refused:
         RESPONSE.predict(RESPONSE.params.model_validate(parameters), context)
     assert refused.value.field == field
+
+
+def test_the_preview_has_the_interval_of_each_reading_as_the_result_has(context: Context) -> None:
+    """Half an interval of 5 ms, a rectangle's 5/√3 ms of delay: a thousand times the share of noise."""
+    params, recordings = taken(context, SwungUnit(), encoder_within_s=5e-3)
+    within = np.where(np.arange(8) == 7, 5e-3 / TIME_STEP_S, 0.0)
+    read = [MemoryRecording(r.info, r.raw.astype(np.float64) + within) for r in recordings]
+    found = RESPONSE.analyse(read, params, context).gyro.channels[0].delay_standard_uncertainty_s
+    promised = {u.name: u.standard_uncertainty for u in RESPONSE.predict(params, context).uncertainties}
+    assert promised["gyro.delay_x"] == pytest.approx(found, rel=1e-3)
+    assert found == pytest.approx(5e-3 / np.sqrt(3.0), rel=1e-3)
+
+
+def test_the_interval_of_a_reading_is_that_of_its_rate_over_a_line_alone(context: Context) -> None:
+    table = DeclaredDevice("turntable", False, "acutrol", "tcp://127.0.0.1:5025")
+    wired = replace(context, bench=replace(context.bench, devices=(table,)))
+    params = RESPONSE.params(encoder_rate_hz=80.0)
+    assert RESPONSE.resolve(params, wired).encoder_within_s == pytest.approx(6.25e-3)
+    assert RESPONSE.resolve(params, context).encoder_within_s == 0.0
+    predicted = RESPONSE.predict(params, wired)
+    assert min(u.standard_uncertainty for u in predicted.uncertainties if "delay" in u.name) > 6.2e-3 / np.sqrt(3.0)
+    assert "each reading taken within ±6.25 ms" in predicted.basis
 
 
 def test_a_table_that_follows_no_sinusoid_is_said(context: Context) -> None:

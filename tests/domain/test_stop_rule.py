@@ -110,7 +110,7 @@ def test_the_same_rule_ends_the_dwells_of_every_procedure_that_takes_means(name:
     context = replace(CONTEXT, unit=replace(CONTEXT.unit, calibrations=known))
     given = {"dwell_s": 100.0, "stop_at": {"gyro_deg_h": 0.03}}
     params = procedure.resolve(procedure.params.model_validate(given), context)
-    expected = params.stop_at.expected_s(100.0)
+    expected = expected_s(params.stop_at.rule, 100.0)
     stations = procedure.schedule(params)
     assert {s.until for s in stations} == {params.stop_at.rule}
     result = procedure.analyse(recorded(procedure, stations), params, context)
@@ -132,7 +132,7 @@ def test_a_calibration_ends_its_dwells_and_tells_what_it_saved():
     )
     assert params.stop_at is not None
     assert params.stop_at.rule is not None
-    expected = params.stop_at.expected_s(200.0)
+    expected = expected_s(params.stop_at.rule, 200.0)
     assert 5.0 <= expected < 150.0
     stations = calibration.schedule(params)
     assert {s.record_s for s in stations} == {200.0}

@@ -32,6 +32,9 @@ MOST_TURN_EXTRA_S = 60.0
 data wait (`bench_service.drivers.devices.unit_recordings.HELD_S`).
 """
 
+AFTER_DEMAND = "after_demand_s"
+"""Setting of a table's driver whose controller needs a pause after each demand."""
+
 
 def described(
     file: BenchFile, simulated: BenchDescription | None, found: Mapping[Kind, Found] | None = None
@@ -76,17 +79,45 @@ def described(
 
 
 def _no_turns(file: BenchFile, extra_s: float) -> str:
-    """The reason why no job with whole turns runs: at this time factor the table's demands take too long."""
+    """The reason why no job with whole turns runs: the table's demands take too long."""
     if extra_s <= MOST_TURN_EXTRA_S:
         return ""
     table = file.devices["turntable"]
     assert isinstance(table, TurntableSection)
-    steps = (n / 10.0 for n in range(1, round(10.0 * file.time_factor)))
-    largest = max((f for f in steps if table.turn_extra_s(f) <= MOST_TURN_EXTRA_S), default=0.0)
     return (
-        f"simulation.time_factor = {file.time_factor:g}: whole turns would take {extra_s:.0f} s of bench time for the "
-        f"table's demands alone, more than {MOST_TURN_EXTRA_S:g} s; a factor of at most {largest:g} lets them run"
+        f"{_cause(file, table)}: whole turns would take {extra_s:.0f} s of bench time for the table's demands alone, "
+        f"more than {MOST_TURN_EXTRA_S:g} s{_way_out(file, table)}"
     )
+
+
+def _cause(file: BenchFile, table: TurntableSection) -> str:
+    """The setting that makes demands slow: the time factor of served simulators, else the pause after a demand."""
+    pause_s = getattr(table, AFTER_DEMAND, None)
+    if file.time_factor > 1.0 or pause_s is None:
+        return f"simulation.time_factor = {file.time_factor:g}"
+    return f"turntable.{AFTER_DEMAND} = {pause_s:g}"
+
+
+def _way_out(file: BenchFile, table: TurntableSection) -> str:
+    """The largest time factor that lets whole turns run, or, at that of real devices, the longest pause; or nothing."""
+    factor, pause_s = file.time_factor, getattr(table, AFTER_DEMAND, None)
+    if factor > 1.0 and (factors := [f for f in _tenths(1.0, factor) if table.turn_extra_s(f) <= MOST_TURN_EXTRA_S]):
+        return f"; a factor of at most {max(factors):g} lets them run"
+    if pause_s is None:
+        return ""
+    pauses = [
+        s
+        for s in _tenths(0.0, pause_s)
+        if table.model_copy(update={AFTER_DEMAND: s}).turn_extra_s(factor) <= MOST_TURN_EXTRA_S
+    ]
+    if not pauses:
+        return ""
+    most = f"turntable.{AFTER_DEMAND} of at most {max(pauses):g} s"
+    return f"; {most} lets them run, where the controller takes demands so fast"
+
+
+def _tenths(first: float, end: float) -> list[float]:
+    return [n / 10.0 for n in range(round(10.0 * first), round(10.0 * end))]
 
 
 def _no_thermal_jobs(file: BenchFile) -> str:

@@ -92,8 +92,7 @@ class SwingingTable(WatchedTable):
                 wanted = f"{sinusoid.amplitude_deg:g} deg"
                 raise DeviceFault(f"the {sinusoid.axis} axis swung by {largest:.4g} deg where {wanted} were demanded")
         except BaseException as failure:
-            if demand == self._demand:  # else whoever took over stops it
-                await self._stop_unfollowed(index, self._stop_at_rate(index), failure)
+            await self._stop_unfollowed(index, demand, failure)
             raise
         finally:
             self._end(demand)

@@ -123,7 +123,7 @@ class AcutrolTurntable(SwingingTable):
         if (turning := self._turning) is not None:
             turning.cancel()
             await asyncio.wait([turning], timeout=LEAVE_S)  # its last statement, which brakes, before those from here
-        if await self._rests():
+        if await self._rests() and not await self._begins_to_move():
             return
         longest = max(axis.rate_deg_s / axis.acceleration_deg_s2 for axis in self._axes())
         braked: list[int] = []
@@ -148,10 +148,17 @@ class AcutrolTurntable(SwingingTable):
         for index in sorted(moving, key=lambda k: -abs(states[k].rate_deg_s)):
             braked.append(index)
             await self._stop_at_rate(index)
-        for index in range(len(states)):  # one that swings stands still where it turns
-            if index not in braked and is_mode(await self._link.mode_of(index), "synthesis"):
+        for index in range(len(states)):  # one that swings stands still where it turns, and where it begins
+            if index not in braked and _moves_on(await self._link.mode_of(index)):
                 braked.append(index)
                 await self._stop_at_rate(index)
+
+    async def _begins_to_move(self) -> bool:
+        """True if an axis is in a mode that moves it: a slow motion looks like rest for seconds after its begin."""
+        for index in range(len(AXES)):
+            if _moves_on(await self._link.mode_of(index)):
+                return True
+        return False
 
     def close(self) -> None:
         """Drop the line; see `WireDevice`."""
@@ -191,7 +198,7 @@ class AcutrolTurntable(SwingingTable):
             progress.read(states[index].position_deg, rested, not_turned)
             await self._return(turn, index, start, turn.angle_deg - progress.turned_deg, demand)
         except BaseException as failure:
-            await self._stop_unfollowed(index, self._link.demand("rate", index, 0.0), failure)
+            await self._stop_unfollowed(index, demand, failure)
             raise
         finally:
             self._end(demand)
@@ -206,7 +213,7 @@ class AcutrolTurntable(SwingingTable):
             await self._link.demand("position", index, (await self._link.states())[index].position_deg)
             await self._link.mode("position", [index])
         except BaseException as failure:
-            await self._stop_unfollowed(index, self._link.demand("rate", index, 0.0), failure)
+            await self._stop_unfollowed(index, demand, failure)
             raise
         finally:
             self._end(demand)
@@ -239,6 +246,11 @@ class AcutrolTurntable(SwingingTable):
         await self._link.mode("position", [index])
         ends = [end if k == index else angle for k, angle in enumerate(start)]
         await self._wait_for_rest(ends, _duration_s(abs(left_deg), axis.rate_deg_s, axis.acceleration_deg_s2), demand)
+
+
+def _moves_on(mode: str) -> bool:
+    """True for a mode in which an axis moves until the mode or the demand changes; in the others it comes to rest."""
+    return is_mode(mode, "synthesis") or is_mode(mode, "rate")
 
 
 def _duration_s(distance_deg: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:

@@ -2,8 +2,6 @@
 
 import asyncio
 import logging
-from collections.abc import Coroutine
-from typing import Any
 
 from bench_service.drivers.devices.acutrol_link import AcutrolLink, AcutrolSection
 from bench_service.drivers.devices.table_axes import AXES, TurnCount, declared, wrapped
@@ -138,14 +136,16 @@ class WatchedTable:
         await self._link.demand("rate", index, 0.0)
         await self._link.mode("rate", [index])
 
-    async def _stop_unfollowed(self, index: int, stopping: Coroutine[Any, Any, None], failure: BaseException) -> None:
-        """Send the statements that stop an axis which is not followed any more, because of a failure.
+    async def _stop_unfollowed(self, index: int, demand: int, failure: BaseException) -> None:
+        """Brake an axis that is not followed any more, unless another demand took over, which stops it by itself.
 
-        Raises `Disconnected` or `DeviceFault` naming both failures where they fail too. After a cancel, or where
-        another demand took over, that is logged and written to the journal: whoever did that stops the axis.
+        Raises `Disconnected` or `DeviceFault` naming both failures where the axis cannot be braked either. After a
+        cancel that is logged and written to the journal: whoever cancelled makes the table safe.
         """
+        if demand != self._demand:
+            return
         try:
-            await asyncio.shield(stopping)
+            await asyncio.shield(self._stop_at_rate(index))
         except Exception as error:
             text = f"the {AXES[index]} axis could not be stopped: {error}"
             log.error("the turntable of bench %s: %s", self._bench_id, text)

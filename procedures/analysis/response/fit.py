@@ -5,7 +5,7 @@ Fitted are ln G, D and q = T², in which the gain ``ln G − ½·ln(1 + ω²q)``
 smooth at T = 0, where T itself cannot be told from a delay. q may come out below zero by noise, and is left there.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi, sqrt
 
@@ -42,7 +42,7 @@ class Lag:
     @property
     def chi_square(self) -> float:
         """Sum of squares of all residuals."""
-        return float(self.gain_residuals @ self.gain_residuals + self.phase_residuals @ self.phase_residuals)
+        return float(self.gain_residuals @ self.gain_residuals) + self.phase_chi_square
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -53,6 +53,16 @@ class Lag:
     def phase_freedom(self) -> int:
         """Phases less the delay: the lag is known from the gains."""
         return len(self.phase_residuals) - 1
+
+    @property
+    def phase_chi_square(self) -> float:
+        """Sum of squares of the phases' residuals."""
+        return float(self.phase_residuals @ self.phase_residuals)
+
+    @property
+    def phase_excess(self) -> float:
+        """Sum of squares of the phases' residuals beyond what noise makes of them on average."""
+        return self.phase_chi_square - self.phase_freedom
 
     @property
     def p_value(self) -> float | None:
@@ -99,7 +109,7 @@ class Lags:
     scatter_s: float
     """Standard deviation of the delay from recording to recording beyond the noise [s]; 0: none shows."""
     p_value_without: float | None
-    """Chance of the residuals where the stamps keep one delay; None without degrees of freedom."""
+    """Chance of the phases' residuals where the stamps keep one delay; None without degrees of freedom."""
 
 
 def model(parameters: Array, omega: Array) -> tuple[Array, Array]:
@@ -110,34 +120,38 @@ def model(parameters: Array, omega: Array) -> tuple[Array, Array]:
     return gain, -omega * delay_s + omega * time_constant - np.arctan(omega * time_constant)
 
 
-def fit_lags(channels: Sequence[Sequence[Response]], linearity: float) -> Lags:
-    """Fit each channel's responses at three or more frequencies.
+def fit_lags(channels: Mapping[str, Sequence[Response]], linearity: float) -> Lags:
+    """Fit the responses at three or more frequencies of each channel, by its name; the fits are in their order.
 
     `linearity`: relative standard deviation of the gain from frequency to frequency by the gyro's scale factor, whose
     rates differ. Where the phases are not the noise's alone, the delay is taken to differ from recording to recording,
     with the standard deviation that makes the phases' residuals as large as their degrees of freedom (Paule-Mandel).
-    Raises `UnfitRecording` where a channel does not follow.
+    Gains that misfit say nothing of the delay: `gain_p_value` judges them.
+    Raises `UnfitRecording` where a channel does not follow, or its delay differs by more than `MOST_SCATTER_S`.
     """
-    for r in (r for responses in channels for r in responses):
+    for r in (r for responses in channels.values() for r in responses):
         require_known(r.label, max(r.gain_sd, r.phase_sd))
-    alone = tuple(_fit(responses, linearity, 0.0) for responses in channels)
-    squares, degrees = _total(alone)
-    p = tail_probability(squares, degrees) if degrees > 0 else None
-    if p is None or p >= LEVEL:
-        return Lags(alone, 0.0, p)
+
+    def fitted(scatter_s: float) -> tuple[Lag, ...]:
+        return tuple(_fit(responses, linearity, scatter_s) for responses in channels.values())
 
     def excess(scatter_s: float) -> float:
-        made = [_fit(r, linearity, scatter_s) for r in channels]
-        return sum(float(lag.phase_residuals @ lag.phase_residuals) - lag.phase_freedom for lag in made)
+        return sum(lag.phase_excess for lag in fitted(scatter_s))
 
-    if not excess(0.0) > 0.0:  # the gains alone misfit: the p-value says so
+    alone = fitted(0.0)
+    degrees = sum(lag.phase_freedom for lag in alone)
+    p = tail_probability(sum(lag.phase_chi_square for lag in alone), degrees) if degrees > 0 else None
+    if p is None or p >= LEVEL:
         return Lags(alone, 0.0, p)
+    most = fitted(MOST_SCATTER_S)
+    if sum(lag.phase_excess for lag in most) > 0.0:
+        worst, _ = max(zip(channels, most, strict=True), key=lambda pair: pair[1].phase_excess)
+        raise UnfitRecording(
+            f"{worst}: the delay differs from recording to recording by more than {MOST_SCATTER_S:g} s: the stamps of "
+            "the unit's samples or the table's readings are wrong"
+        )
     scatter = float(brentq(excess, 0.0, MOST_SCATTER_S, xtol=1e-10, rtol=1e-6))
-    return Lags(tuple(_fit(r, linearity, scatter) for r in channels), scatter, p)
-
-
-def _total(lags: Sequence[Lag]) -> tuple[float, int]:
-    return sum(lag.chi_square for lag in lags), sum(lag.degrees_of_freedom for lag in lags)
+    return Lags(fitted(scatter), scatter, p)
 
 
 def gain_p_value(lag: Lag) -> float | None:

@@ -71,14 +71,12 @@ def largest_amplitude_deg(frequency_hz: float, rate_deg_s: float, acceleration_d
 
 @dataclass(frozen=True)
 class EncoderQuality:
-    """Encoder as a plan expects it, and what no reading of it shows."""
+    """Scatter and rate of an encoder as a plan expects them."""
 
     sd_arcsec: float
     """Standard deviation of one reading."""
     rate_hz: float
     """Readings a second."""
-    time_sd_s: float
-    """Standard uncertainty of the time of its readings, the same for all [s]."""
 
 
 def predicted_lags(
@@ -98,7 +96,7 @@ def predicted_lags(
             _predicted(program, noise[AXES.index(axis)], rate_hz, encoder, frequency, amplitude)
             for frequency, amplitude in zip(program.frequencies_hz, program.amplitudes_deg, strict=True)
         ]
-        found.append(fit_lags([responses], linearity).lags[0])
+        found.append(fit_lags({axis: responses}, linearity).lags[0])
     return tuple(found)
 
 

@@ -113,7 +113,7 @@ def analyse_response(
     for channel, responses in by_channel.items():
         if len({r.frequency_hz for r in responses}) < 3:
             raise UnfitRecording(f"{channel}: a delay and a lag need three frequencies, there are {len(responses)}")
-    lags = fit_lags(list(by_channel.values()), linearity)
+    lags = fit_lags(by_channel, linearity)
     within = float(np.mean([r.within_s for responses in by_channel.values() for r in responses]))
     encoder_sd = hypot(within / sqrt(3.0), encoder_time_sd_s)
     freedom = sum(lag.phase_freedom for lag in lags.lags)
