@@ -157,7 +157,7 @@ def test_no_certificate_and_one_of_other_numbers_are_not_printed(calibrated: Cal
     document = base64.b64encode(json.dumps({"unit": "SIM-0001", "triads": []}).encode()).decode()
     for text, says in (
         ("<a/>", "no certificate of version 3.3.0"),
-        ("not XML", "no XML"),
+        ("not XML", "certificate: not XML: Start tag"),
         (xml.replace(value, value + "1", 1), "not those of the attached"),
         (f"<a><dataBase64>{document}</dataBase64></a>", "no certificate of version 3.3.0"),
     ):
