@@ -586,9 +586,13 @@ CREATE INDEX ix_recording_holds_recording_id ON recording_holds (recording_id);
 
 CREATE INDEX ix_recordings_bench_id ON recordings (bench, id);
 
-CREATE INDEX ix_recordings_file_names_id ON recordings (file_names, id) WHERE file_names IS NOT NULL;
+CREATE INDEX ix_recordings_file_names_id ON recordings (file_names, id) WHERE length(file_names) <= 500;
 
 CREATE INDEX ix_recordings_job_id_id ON recordings (job_id, id);
+
+CREATE INDEX ix_recordings_long_file_names ON recordings (id) WHERE length(file_names) > 500;
+
+CREATE INDEX ix_recordings_long_station_label ON recordings (id) WHERE length(station_label) > 500;
 
 CREATE INDEX ix_recordings_raw_state_stored_bytes ON recordings (raw, state, stored_bytes);
 
@@ -596,7 +600,7 @@ CREATE INDEX ix_recordings_simulated_id ON recordings (simulated, id);
 
 CREATE INDEX ix_recordings_state_stored_bytes ON recordings (state, stored_bytes);
 
-CREATE INDEX ix_recordings_station_label_id ON recordings (station_label, id);
+CREATE INDEX ix_recordings_station_label_id ON recordings (station_label, id) WHERE length(station_label) <= 500;
 
 CREATE INDEX ix_recordings_unit_id ON recordings (unit, id);
 

@@ -34,7 +34,7 @@ class RecordingSelection(Request):
 
     unit: str | None = Field(None, max_length=100)
     procedure: str | None = Field(None, max_length=100, description="Procedure of the job that recorded")
-    job: str | None = Field(None, max_length=100)
+    job: str | None = Field(None, max_length=100, description="Only recordings of this job, by id or number")
     simulated: bool | None = None
     verdict: Verdict | None = Field(None, description="Verdict of the job that recorded")
     since: AwareDatetime | None = Field(None, description="Created at this time or later, with time zone")

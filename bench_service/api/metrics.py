@@ -23,7 +23,7 @@ from bench_service.bench.live.values import BenchLive
 from bench_service.jobs.events.hub import EventHub
 from bench_service.model.job import FINAL, JobState
 from bench_service.service import BenchService
-from bench_service.telemetry.tallies import DURATION_S, Spread, Tallies
+from bench_service.telemetry.tallies import DURATION_S, NEVER_LEFT, Spread, Tallies
 from bench_service.wall_clock import monotonic_s, now
 
 router = APIRouter(tags=["health"])
@@ -72,11 +72,8 @@ class Snapshot(Collector):
     def _jobs(self) -> Iterator[Metric]:
         tallies = self._tallies
         states = GaugeMetricFamily("bench_jobs", "Jobs by state", labels=["state"])
-        for state, count in self._service.stores.jobs.counts(
-            [state for state in JobState if state not in FINAL]
-        ).items():
-            states.add_metric([state.value], count)
-        for state, count in tallies.ended().items():
+        left = self._service.stores.jobs.counts([state for state in JobState if state not in NEVER_LEFT])
+        for state, count in {**left, **tallies.ended()}.items():
             states.add_metric([state.value], count)
         yield states
         labels = ["procedure", "state", "verdict"]

@@ -1,5 +1,6 @@
 """Routes of results: run a method on stored evidence, and read results by id."""
 
+from dataclasses import replace
 from datetime import datetime
 from typing import Annotated, Any
 
@@ -15,6 +16,7 @@ from bench_service.api.http.printed import PDF, PRINTED, printed
 from bench_service.api.http.queries import Searched
 from bench_service.evidence.analyses import AnalysisRequest
 from bench_service.evidence.recomputation import Recomputation
+from bench_service.jobs.numbers import job_id_of
 from bench_service.mapping import copied
 from bench_service.model.batches import BatchRequest, Grouping
 from bench_service.model.records import StoredResult
@@ -143,7 +145,10 @@ def _queued(
         raise BadParameter("recordings", body.recordings[0], "either recordings or a selection (selection.ids)")
     if body.unit is not None:
         raise BadParameter("unit", body.unit, "none: a batch takes the unit of each recording")
-    wanted = copied(BatchRequest, body, selection=selection.query(), calibrations=tuple(body.calibrations))
+    query = selection.query()
+    if query.job is not None:
+        query = replace(query, job=job_id_of(service.stores, query.job))
+    wanted = copied(BatchRequest, body, selection=query, calibrations=tuple(body.calibrations))
     batch = service.batches.submit(wanted, by, key)
     view = BatchView.of(batch).model_dump(mode="json")
     return JSONResponse(view, 202, {"Location": f"/api/v1/analyses/batches/{batch.id}"})

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
-from sqlalchemy import ColumnElement, Select, and_, exists, func, or_, select
+from sqlalchemy import ColumnElement, Select, and_, exists, func, literal_column, or_, select
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.functions import FunctionElement
 
 from bench_service.model.job import job_number
 from bench_service.model.search import LabelSought, Search
-from bench_service.persistence.tables.evidence import NAMES_JOIN, RecordingRow, ResultRow
+from bench_service.persistence.tables.evidence import KEY_LENGTH, NAMES_JOIN, RecordingRow, ResultRow
 from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
 
 S = TypeVar("S", bound=Select[*tuple[Any, ...]])
@@ -125,12 +125,22 @@ def text_held(column: Any, text: str) -> ColumnElement[bool]:
 
 
 def imported_name_holds(text: str, row: type[RecordingRow] = RecordingRow) -> ColumnElement[bool]:
-    """Return whether the name of an imported file holds a text: a walk over those names, which jobs lack."""
+    """Return whether the name of an imported file holds a text."""
     held = text_held(row.file_names, text)
     if NAMES_JOIN in text:
         files = ImportedNames(row.source).table_valued("name")
         held = and_(held, exists(select(files.c.name).where(text_held(files.c.name, text))))
     return and_(row.file_names.is_not(None), held)
+
+
+def short(column: Any) -> ColumnElement[bool]:
+    """Return whether a text is short, as the condition of the index of such texts says it: the bound in words."""
+    return func.length(column) <= literal_column(str(KEY_LENGTH))
+
+
+def long(column: Any) -> ColumnElement[bool]:
+    """Return whether a text is long, as the condition of the index of their rows says it."""
+    return func.length(column) > literal_column(str(KEY_LENGTH))
 
 
 @compiles(ImportedNames, "sqlite")

@@ -3,7 +3,8 @@
 To look for a part of a word in every row costs what the history costs. A history has few different words: units,
 procedures, benches, people, stations and labels repeat. So the different values of a column are gone through first, by
 one step along its index for each, and then only the rows that have one of those that hold the text. Ids are all
-different, and are looked through in their index alone, where the text could be a part of one.
+different, and are looked through in their index alone, where the text could be a part of one. Names of files and labels
+of stations may be of any length: the few long ones are no keys, and are read from their rows.
 
 Each list gets conditions of which at least one must hold; each of them is a walk along one index.
 """
@@ -16,7 +17,7 @@ from sqlalchemy import ColumnElement, and_, func, or_, select
 from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
 
 from bench_service.model.job import job_number
-from bench_service.persistence.searching import imported_name_holds, text_held
+from bench_service.persistence.searching import imported_name_holds, long, short, text_held
 from bench_service.persistence.tables.evidence import RecordingRow, ResultRow
 from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
 
@@ -42,14 +43,21 @@ def ways_to_jobs(session: Session, text: str) -> Ways:
 
 def ways_to_recordings(session: Session, text: str) -> Ways:
     """Conditions of recordings, at least one of which holds where a recording or its job's labels have the text."""
-    named = (RecordingRow.unit, RecordingRow.bench, RecordingRow.station_label)
+    label = _in_column(session, RecordingRow.station_label, text, short(RecordingRow.station_label))
+    names = imported_name_holds(text, _OTHER)
+    by_row = (
+        and_(long(_OTHER.station_label), text_held(_OTHER.station_label, text)),
+        and_(short(_OTHER.file_names), names),
+        and_(long(_OTHER.file_names), names),
+    )
     of_job = tuple(RecordingRow.job_id.in_(select(JobRow.id).where(way)) for way in _in_ids(JobRow.id, text))
     return (
-        *_in_columns(session, named, text),
+        *_in_columns(session, (RecordingRow.unit, RecordingRow.bench), text),
+        *([] if label is None else [label]),
         *_in_ids(RecordingRow.id, text),
         *of_job,
         *_in_job(session, RecordingRow.job_id, text),
-        RecordingRow.id.in_(select(_OTHER.id).where(imported_name_holds(text, _OTHER))),
+        *(RecordingRow.id.in_(select(_OTHER.id).where(way)) for way in by_row),
     )
 
 
@@ -70,7 +78,7 @@ def _in_columns(session: Session, columns: Sequence[_Column], text: str) -> list
 
 
 def _in_column(session: Session, column: _Column, text: str, *where: ColumnElement[bool]) -> ColumnElement[bool] | None:
-    """Return the condition that a column holds a text; None where no row does. `where`: fixes columns before it."""
+    """Return the condition that a column holds a text; None where no row does. `where`: see `_values`."""
     known = _values(session, column, text, where)
     if known is None or sum(known.values()) > LISTED:
         return and_(*where, text_held(column, text))
@@ -83,7 +91,7 @@ def _values(
 ) -> dict[str, bool] | None:
     """Find the different values of a column, and whether each holds a text; None where there are more than `MOST`.
 
-    The column begins an index, or follows the columns of `where` in one.
+    The column begins an index, whose condition `where` is, or follows columns in one that `where` fixes.
     """
     steps = select(func.min(column).label("value")).where(*where).cte("steps", recursive=True)
     following = select(func.min(column)).where(*where, column > steps.c.value).correlate(steps).scalar_subquery()

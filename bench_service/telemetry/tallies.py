@@ -15,9 +15,11 @@ from threading import Lock
 from typing import Protocol
 
 from bench_service.background import in_background
-from bench_service.model.job import FINAL, JobState
+from bench_service.model.job import LEGAL, JobState
 from bench_service.wall_clock import monotonic_s, now
 
+NEVER_LEFT = tuple(state for state in JobState if not LEGAL[state])
+"""States that no job leaves: it ends there once. A failed job may be resumed, and end again."""
 OVERLAP = timedelta(seconds=60)
 PAGE = 5000
 RECORDINGS_S = 30.0
@@ -115,11 +117,11 @@ class Tallies:
             self._add_up_recordings()
 
     def ended(self) -> dict[JobState, int]:
-        """Number of jobs in each of the last states, as counted: counting again takes longer with the history."""
+        """Number of jobs in each state that is never left, as tallied: the database counts longer with the history."""
         found = Counter[str]()
         for (_, state, _), count in self.finished.items():
             found[state] += count
-        return {state: found[state.value] for state in JobState if state in FINAL}
+        return {state: found[state.value] for state in NEVER_LEFT}
 
     def _add_up_recordings(self) -> None:
         """Make the sum over all recordings: the first one here, later ones in a thread of their own.

@@ -11,7 +11,8 @@ down_revision = "0020"
 branch_labels = None
 depends_on = None
 
-NOT_NULL = sa.text("file_names IS NOT NULL")
+KEY_LENGTH = 500
+"""Most characters of a text that is the key of an index: Postgres takes 2704 bytes, and a character has up to four."""
 OF_A_TREND = ["unit", "name", "simulated", "id", "job_id", "created_at", "code_version"]
 LABEL = {
     "sqlite": "json_extract(station, '$.label')",
@@ -37,24 +38,24 @@ def upgrade() -> None:
     names, where = NAMES[dialect]
     op.execute(f"UPDATE recordings SET file_names = {names} WHERE {where}")
     op.create_index("ix_recordings_bench_id", "recordings", ["bench", "id"])
-    op.create_index("ix_recordings_station_label_id", "recordings", ["station_label", "id"])
-    op.create_index(
-        "ix_recordings_file_names_id",
-        "recordings",
-        ["file_names", "id"],
-        sqlite_where=NOT_NULL,
-        postgresql_where=NOT_NULL,
-    )
+    for column in ("station_label", "file_names"):
+        short, long = (sa.text(f"length({column}) {bound} {KEY_LENGTH}") for bound in ("<=", ">"))
+        _index(f"ix_recordings_{column}_id", [column, "id"], short)
+        _index(f"ix_recordings_long_{column}", ["id"], long)
     op.create_index("ix_jobs_requested_by_id", "jobs", ["requested_by", "id"])
     op.create_index("ix_jobs_result_id_id", "jobs", ["result_id", "id"])
     op.create_index("ix_results_unit_name_simulated_id", "results", OF_A_TREND)
+
+
+def _index(name: str, columns: list[str], where: sa.TextClause) -> None:
+    op.create_index(name, "recordings", columns, sqlite_where=where, postgresql_where=where)
 
 
 def downgrade() -> None:
     op.drop_index("ix_results_unit_name_simulated_id", "results")
     op.drop_index("ix_jobs_result_id_id", "jobs")
     op.drop_index("ix_jobs_requested_by_id", "jobs")
-    for name in ("file_names_id", "station_label_id", "bench_id"):
+    for name in ("long_file_names", "file_names_id", "long_station_label", "station_label_id", "bench_id"):
         op.drop_index(f"ix_recordings_{name}", "recordings")
     op.drop_column("recordings", "file_names")
     op.drop_column("recordings", "station_label")

@@ -3,9 +3,10 @@
 import json
 import re
 from pathlib import Path
+from urllib.parse import urlencode
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from bench_service.formats.certificate.document import certificate
 from bench_service.formats.certificate.laboratory import laboratory_of
@@ -165,6 +166,50 @@ def test_a_batch_is_started_from_a_search_followed_and_asked_for_its_failures(
     short.get_by_text("Results and failures").click()
     expect(short).to_contain_text("too few for a noise analysis")
     expect(short.get_by_role("button", name="Once more")).to_be_visible()
+
+
+def test_a_batch_takes_what_the_last_search_shows_and_a_job_by_its_number(
+    window: Watched, service: BenchProcess, calibrated: str
+) -> None:
+    number = service.client.get(f"/api/v1/jobs/{calibrated}").json()["number"]
+    label = service.client.get(f"/api/v1/recordings?job={number}").json()["items"][0]["station"]["label"]
+    few = {"job": str(number), "text": label}
+    count = len(service.client.get("/api/v1/recordings", params=few).json()["items"])
+    assert 0 < count < 12
+    page = window.open(f"/recordings?{urlencode(few)}")
+    expect(page.locator("#found tbody tr")).to_have_count(count)
+    page.locator("#search [name=text]").fill("nothing has this")  # not searched for
+    page.locator("#method").select_option("allan_deviation")
+    page.locator("#each").select_option("recording")
+    page.get_by_role("button", name="Run the method").click()
+    batch = page.locator("#batches tr[data-batch]").first
+    expect(batch).to_contain_text(f"{count} of {count}", timeout=60_000)
+    expect(batch).to_contain_text(f"Job {calibrated}")
+
+
+def test_batches_are_followed_past_failed_looks_and_their_button_keeps_the_focus(
+    window: Watched, service: BenchProcess, calibrated: str
+) -> None:
+    """Answers are the test's own: one batch under way, then two looks without an answer, then more of it done."""
+    body = {"method": "allan_deviation", "selection": {"job": calibrated}}
+    real = service.client.post("/api/v1/analyses", json=body).json()
+    looks: list[int] = []
+
+    def answer(route: Route) -> None:
+        looks.append(1)
+        if len(looks) in (2, 3):
+            route.fulfill(status=503, json={"title": "away", "detail": "the database is away"})
+            return
+        counts = {**dict.fromkeys(real["counts"], 0), "running": 1, "done": len(looks), "waiting": 99 - len(looks)}
+        route.fulfill(json={"items": [{**real, "state": "running", "total": 100, "counts": counts}], "next": None})
+
+    window.context.route("**/api/v1/analyses/batches?*", answer)
+    window.expected = re.compile("status of 503")
+    page = window.open("/recordings")
+    cancel = page.locator("#batches").get_by_role("button", name="Cancel")
+    cancel.focus()
+    expect(page.locator("#batches")).to_contain_text("5 of 100", timeout=20_000)
+    expect(cancel).to_be_focused()
 
 
 def test_a_known_calibration_is_entered_and_a_remark_added(window: Watched, service: BenchProcess) -> None:

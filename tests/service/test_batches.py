@@ -56,6 +56,15 @@ def test_a_selection_is_analysed_once_and_a_second_batch_takes_what_is_stored(sq
     assert sqlite_client.http.get(PATH).json()["items"][0]["id"] == other["id"]
 
 
+def test_the_job_of_a_selection_is_named_by_its_number_too(sqlite_client: Client, job: dict) -> None:
+    for name in (str(job["number"]), f"#{job['number']}"):
+        batch = ended(sqlite_client, submitted(sqlite_client, {"job": name}))
+        assert (batch["selection"]["job"], batch["total"]) == (job["id"], 12)
+    body = {"method": "allan_deviation", "selection": {"job": "99999"}}
+    answer = sqlite_client.http.post("/api/v1/analyses", json=body)
+    assert (answer.status_code, "99999" in answer.text) == (404, True)
+
+
 def test_an_analysis_that_was_requested_alone_is_taken_by_a_batch(sqlite_client: Client, job: dict) -> None:
     recording = sqlite_client.recordings(job["id"])[0]["id"]
     alone = sqlite_client.analyse("allan_deviation", recordings=[recording], parameters={"points": 30}).json()

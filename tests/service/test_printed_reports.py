@@ -4,7 +4,8 @@ import base64
 import json
 import sqlite3
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -156,7 +157,7 @@ def test_no_certificate_and_one_of_other_numbers_are_not_printed(calibrated: Cal
     document = base64.b64encode(json.dumps({"unit": "SIM-0001", "triads": []}).encode()).decode()
     for text, says in (
         ("<a/>", "no certificate of version 3.3.0"),
-        ("not XML", "no XML"),
+        ("not XML", "certificate: not XML: Start tag"),
         (xml.replace(value, value + "1", 1), "not those of the attached"),
         (f"<a><dataBase64>{document}</dataBase64></a>", "no certificate of version 3.3.0"),
     ):
@@ -224,6 +225,26 @@ def test_pages_lead_to_the_reports(calibrated: Calibrated) -> None:
     for page, reported in ((result, result), (f"/jobs/{job}", result), ("/units/SIM-0001", "/units/SIM-0001")):
         assert f"/api/v1{reported}/report.pdf" in calibrated.client.http.get(page).text
     assert "procedure=verification_9_orientations" in calibrated.client.http.get("/").text
+
+
+def test_a_second_analysis_a_year_later_judges_certificates_by_the_day_of_the_recordings(
+    calibrated: Calibrated,
+) -> None:
+    stores, opened = open_stores(f"sqlite:///{calibrated.books}")
+    try:
+        known = stores.results.get(calibrated.result)
+        job = stores.jobs.get(known.job_id or "")
+        for due, marked in ((job.created_at, False), (job.created_at - timedelta(days=1), True)):
+            certificate = {"number": "PTB 1", "laboratory": "PTB", "due": due.date().isoformat()}
+            device = {"name": "turntable", "simulated": True, "driver": "", "certificate": certificate}
+            context = {**known.context, "bench": {**known.context["bench"], "devices": [device]}}
+            again = replace(known, created_at=known.created_at + timedelta(days=365), context=context)
+            for by in (job, None):
+                words = words_of(result_report(stores, Catalogue(), gathered(stores, again, by)))
+                assert f"PTB 1 PTB {due.date()}" in words
+                assert ("OVERDUE" in words) is marked, (due, by)
+    finally:
+        opened.dispose()
 
 
 def test_a_static_run_shows_the_noise_as_found_and_as_left_and_its_trend(calibrated: Calibrated) -> None:

@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 from uuid import UUID
 
+import numpy as np
 import pytest
 
 from bench_service.campaigns.stores import Stores
@@ -12,6 +13,7 @@ from bench_service.model.job import Job
 from bench_service.model.records import NewRecording, StoredResult
 from bench_service.model.search import LabelSought, Search
 from bench_service.persistence import text_search
+from bench_service.persistence.tables.evidence import KEY_LENGTH
 from bench_service.wall_clock import new_id
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray, Station
@@ -186,6 +188,32 @@ def test_recordings_have_labels_and_verdict_of_their_job(
     assert found(text="sha256") == found(text="nothing") == []
     by_chance = [i for i, job in enumerate(jobs) if "70" in made[i] or "70" in job.id]  # ids are searched, too
     assert found(text="70") == [imported] * ("70" in imported) + [made[i] for i in sorted({1, 7, *by_chance})[::-1]]
+
+
+def test_names_and_labels_of_any_length_are_stored_and_found(
+    stores: Stores, new_recording: Callable[..., NewRecording], samples: Callable[..., RawArray]
+) -> None:
+    """Random letters, which Postgres cannot compress to the 2704 bytes that a key of an index may have."""
+    letters = np.random.Generator(np.random.PCG64(7))
+
+    def store(**given: Any) -> str:
+        writer = stores.recordings.open(new_recording(**given))
+        writer.write(samples(3))
+        return writer.seal().id
+
+    def long(end: str, size: int) -> str:
+        return "".join(chr(code) for code in letters.integers(0x410, 0x450, size)) + end
+
+    files = [{"name": long(f".Drive_{number}", 240)} for number in range(64)]
+    made = {
+        "drive_63": store(source={"files": files}),
+        "drive_a": store(source={"files": [{"name": long("Drive_A", KEY_LENGTH - 7)}]}),
+        "drive_b": store(source={"files": [{"name": long("Drive_B", KEY_LENGTH - 6)}]}),
+        "station_x": store(station=Station(0, long("Station_X", 4000))),
+        "station_y": store(station=Station(0, long("Station_Y", KEY_LENGTH - 9))),
+    }
+    for text, recording in made.items():
+        assert [one.info.id for one in stores.recordings.list(search=Search(text=text)).items] == [recording], text
 
 
 def test_results_have_labels_of_their_job(

@@ -5,6 +5,7 @@ import shutil
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
+from secrets import token_hex
 
 import numpy as np
 import pytest
@@ -89,7 +90,8 @@ def test_a_database_of_each_landed_form_is_upgraded_with_what_it_holds(
     samples = _samples()
     writer.write(samples)
     recording = writer.seal()
-    writer = today.recordings.open(new_recording(source={"files": [{"name": "Drive_2.csv"}, {"name": "b.csv"}]}))
+    long = [{"name": name} for name in ("Drive_2.csv", "b.csv", *(token_hex(120) for _ in range(62)))]  # no key
+    writer = today.recordings.open(new_recording(source={"files": long}))
     writer.write(samples)
     imported = writer.seal()
     result = today.results.add(new_result(job_id=job.id, recordings=((recording.id, recording.content_hash),)))

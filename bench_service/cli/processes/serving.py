@@ -121,8 +121,9 @@ def check_address(settings: Settings) -> None:
     if not may_listen(settings) and not has_credentials(settings.database_url):
         raise Refused(
             f"BENCH_HOST = {settings.host}: the service listens on an address other than a loopback one only with "
-            "accounts (`bench user add`) or a token (`bench token add`, or BENCH_TOKEN_FILE) , or where that "
-            "address can be reached only through a loopback one, BENCH_PUBLISHED=loopback"
+            "accounts (`bench user add`), or with a token that clients send with each request (`bench token add`, or "
+            "one in the file BENCH_TOKEN_FILE), or where that address can be reached only through a loopback one "
+            "(BENCH_PUBLISHED=loopback)"
         )
 
 

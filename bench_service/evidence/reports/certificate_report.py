@@ -1,7 +1,7 @@
 """The printed form of a digital calibration certificate: its own facts, with the plots of the results behind it."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from bench_service.evidence.catalogue import Catalogue
@@ -23,13 +23,16 @@ from bench_service.formats.printed.document import (
     blocks_of,
 )
 from bench_service.model.calibrations import StoredCalibration
+from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 from procedures.core.errors import BadParameter
 
 CERTIFICATE = "certificate.xml"
 
 
-def certificate_report(stores: EvidenceStores, catalogue: Catalogue, serial: str, xml: bytes) -> PrintedDocument:
+def certificate_report(
+    stores: EvidenceStores, catalogue: Catalogue, read_job: Callable[[str], Job], serial: str, xml: bytes
+) -> PrintedDocument:
     """The printed form. Raises `BadParameter` for no certificate, or one whose numbers are not those stored here."""
     root, document, calibrations = _read(stores, serial, xml)
     results = {c.result_id: stores.results.get(c.result_id) for c in calibrations if c.result_id is not None}
@@ -41,10 +44,9 @@ def certificate_report(stores: EvidenceStores, catalogue: Catalogue, serial: str
         given = [c for c in calibrations if c.result_id == result.id]
         found = gathered(stores, result, None).found
         blocks += record_parts.found_and_left(stores, catalogue, result, found, given, None)
-        blocks += [
-            *context_parts.mounting(result.context),
-            *context_parts.instruments(result.context, result.created_at),
-        ]
+        job = None if result.job_id is None else read_job(result.job_id)
+        at = context_parts.recorded_at(result, job, recordings)
+        blocks += [*context_parts.mounting(result.context), *context_parts.instruments(result.context, at)]
         blocks += condition_parts.conditions(result.context, recordings)
     blocks += _calibrations(stores, calibrations, list(results.values()))
     for result in results.values():

@@ -1,10 +1,13 @@
 """Parts of a printed report that a job's context gives: the unit as it was, mounting, instruments, raw data."""
 
 from collections.abc import Iterator, Sequence
-from datetime import date, datetime
+from datetime import datetime
 from typing import Any
 
 from bench_service.formats.printed.document import Block, Facts, Heading, Paragraph, PrintedTable
+from bench_service.model.job import Job
+from bench_service.model.records import StoredRecording, StoredResult
+from procedures.bench.declared_device import DeclaredCertificate
 
 NOT_RECORDED = "not recorded"
 
@@ -50,7 +53,10 @@ def mounting(context: dict[str, Any]) -> Iterator[Block]:
 
 
 def instruments(context: dict[str, Any], at: datetime) -> Iterator[Block]:
-    """Devices of the bench with their certificates, those overdue `at` the result marked, and the table's accuracy."""
+    """Devices of the bench with their certificates, those overdue at a time marked, and the table's accuracy.
+
+    `at`: the time of the recordings (`recorded_at`).
+    """
     bench = context.get("bench") or {}
     yield Heading("Instruments")
     rows: list[tuple[str, ...]] = []
@@ -59,7 +65,7 @@ def instruments(context: dict[str, Any], at: datetime) -> Iterator[Block]:
         named = " ".join(filter(None, (found.get("maker"), found.get("model"))))
         kind = "simulated" if device["simulated"] else named or device["driver"] or NOT_RECORDED
         number = " ".join(filter(None, (certificate.get("number"), certificate.get("laboratory"))))
-        due = _due(certificate.get("due"), at)
+        due = _due(certificate, at)
         rows.append((device["name"], kind, found.get("serial") or "–", number or "none", due))
     if rows:
         columns = ("instrument", "device", "serial", "certificate", "due")
@@ -77,11 +83,22 @@ def instruments(context: dict[str, Any], at: datetime) -> Iterator[Block]:
         yield Facts((("table, standard uncertainties", said),))
 
 
-def _due(day: str | None, at: datetime) -> str:
+def recorded_at(result: StoredResult, job: Job | None, recordings: Sequence[StoredRecording]) -> datetime:
+    """The time by which certificates of instruments are judged: a result that is computed again later has the same.
+
+    It is the job's, as of the result's own warnings; without a job, that of the first recording.
+    """
+    if job is not None:
+        return job.created_at
+    return min((recording.created_at for recording in recordings), default=result.created_at)
+
+
+def _due(certificate: dict[str, Any], at: datetime) -> str:
     """The due day of a certificate, marked where it was over already."""
-    if not day:
+    if not certificate.get("due"):
         return "–"
-    return f"{day}, OVERDUE" if date.fromisoformat(day) < at.date() else day
+    declared = DeclaredCertificate(certificate.get("number", ""), certificate.get("laboratory", ""), certificate["due"])
+    return f"{declared.due}, OVERDUE" if declared.overdue(at.date().isoformat()) else declared.due
 
 
 def hashes(recordings: Sequence[tuple[str, str]]) -> Iterator[Block]:

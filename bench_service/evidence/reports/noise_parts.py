@@ -1,10 +1,12 @@
 """Noise of a unit in a printed report: its record, the change of it by a result, and its trend over static launches."""
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.printed.document import PrintedTable
+from bench_service.model.records import StoredResult
 from procedures.core.recording import TRIADS
 from procedures.core.report import Figure, Series
 from procedures.core.unit import TriadRecord, Unit
@@ -12,7 +14,9 @@ from procedures.core.units import NOISE_DISPLAY
 
 RATE_UNIT = {"gyro": "rad/s", "accelerometer": "m/s^2"}
 NOISE_RESULTS = 20
-"""Newest results that a noise trend looks at; the document of each is read by itself, for it may have a megabyte."""
+"""Most results of a noise trend."""
+MOST_READ = 100
+"""Results that a trend looks at, those of the other origin and older analyses too: each may have a megabyte."""
 LAUNCHES = "static_run"
 """Procedure whose results give the noise of a unit."""
 NOT_SEEN = "≤: no launch showed the process; the value is the one to plan with, from its upper limit."
@@ -75,18 +79,24 @@ def noise_trends(stores: EvidenceStores, serial: str, simulated: bool, before: s
 
 def _documents(stores: EvidenceStores, serial: str, simulated: bool, before: str | None) -> Iterator[dict[str, Any]]:
     """Documents of the unit's static launches, newest first, the newest analysis of each job."""
-    after: str | None = None
     jobs: set[str | None] = set()
-    for _ in range(NOISE_RESULTS):
-        page = stores.results.list(unit=serial, name=LAUNCHES, after=after, limit=1)
-        for result in page.items:
-            young = before is not None and result.id > before
-            if not young and result.simulated == simulated and result.job_id not in jobs:
-                jobs.add(result.job_id)
-                yield result.document
-        after = page.next
-        if after is None:
+    for result in islice(_launches(stores, serial, before), MOST_READ):
+        if result.simulated == simulated and result.job_id not in jobs:
+            jobs.add(result.job_id)
+            yield result.document
+        if len(jobs) == NOISE_RESULTS:
             return
+
+
+def _launches(stores: EvidenceStores, serial: str, first: str | None) -> Iterator[StoredResult]:
+    """Results of the unit's static launches, newest first, one by one; from the result `first` on where it is given."""
+    if first is not None:
+        yield stores.results.get(first)
+    after, more = first, True
+    while more:
+        page = stores.results.list(unit=serial, name=LAUNCHES, after=after, limit=1)
+        yield from page.items
+        after, more = page.next, page.next is not None
 
 
 def _series(documents: Sequence[list[dict[str, Any]]], channel: str, process: str, size: float) -> Series | None:

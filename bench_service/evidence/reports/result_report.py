@@ -67,12 +67,10 @@ def result_report(stores: EvidenceStores, catalogue: Catalogue, of: ResultReport
     blocks += record_parts.found_and_left(stores, catalogue, result, of.found, of.calibrations, of.job)
     if result.unit:
         blocks += people_parts.remarks(stores.unit_notes.list(result.unit, limit=REMARKS).items)
-    if result.context:
-        blocks += [
-            *context_parts.mounting(result.context),
-            *context_parts.instruments(result.context, result.created_at),
-        ]
     recordings = [stores.recordings.get(known) for known, _ in result.recordings]
+    if result.context:
+        at = context_parts.recorded_at(result, of.job, recordings)
+        blocks += [*context_parts.mounting(result.context), *context_parts.instruments(result.context, at)]
     blocks += condition_parts.conditions(result.context, recordings)
     blocks += _calibrations(stores, of)
     report = catalogue.report(result)

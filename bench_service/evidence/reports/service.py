@@ -42,7 +42,7 @@ class ReportService:
         """The printed form of a unit's certificate, which is attached byte for byte. Raises `BadParameter`."""
         from bench_service.evidence.reports.certificate_report import certificate_report  # with scipy and signxml
 
-        return self._typeset(certificate_report(self._stores, self._catalogue, serial, xml.encode()))
+        return self._typeset(certificate_report(self._stores, self._catalogue, self._read_job, serial, xml.encode()))
 
     def _typeset(self, document: PrintedDocument) -> bytes:
         if self._processes is not None:

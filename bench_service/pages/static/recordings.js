@@ -8,7 +8,7 @@ import "./import_wizard.js";
 import { t } from "./words.js";
 
 const at = (id) => document.getElementById(id), search = at("search"), chosen = new Map();
-let next = null, body = null, methods = [], form = null, key = crypto.randomUUID();
+let next = null, shown = null, body = null, methods = [], form = null, key = crypto.randomUUID();
 
 function count() { at("chosen").textContent = t("{n} chosen", { n: chosen.size }) + (chosen.size ? `: ${[...new Set([...chosen.values()].map((one) => one.unit))].join(", ")}` : ""); }
 
@@ -21,11 +21,11 @@ function row(one) {
 }
 
 async function find(after = null) {
-  const asked = new URLSearchParams([...new FormData(search)].filter(([, value]) => value.trim() !== ""));
-  asked.set("limit", "50");
-  if (after) asked.set("after", after);
+  const given = after ? shown : [...new FormData(search)].map(([name, value]) => [name, value.trim()]).filter(([, value]) => value);
+  const asked = new URLSearchParams([...given, ["limit", "50"], ...(after ? [["after", after]] : [])]);
   const page = await busy(search.querySelector("button"), search.querySelector("output"), () => read(`/api/v1/recordings?${asked}`));
   if (!page) return;
+  shown = given;
   search.querySelector("output").textContent = page.items.length ? "" : t("Nothing found.");
   if (!after) {
     body = h("tbody");
@@ -43,14 +43,15 @@ function choose(name) {
   fill(at("form"), form.element);
 }
 
-/** The recordings of the analysis: the chosen ones together, or each of the search in a batch of its own tasks. */
+/** The recordings of the analysis: the chosen ones together, or in a batch all that the search above shows. */
 function evidence() {
   const each = at("each").value;
   if (!each) {
     if (!chosen.size) throw new Error(t("Choose recordings in the list above first."));
     return { recordings: [...chosen.keys()] };
   }
-  return { each, selection: Object.fromEntries([...new FormData(search)].map(([name, value]) => [name, value.trim()]).filter(([, value]) => value)) };
+  if (!shown) throw new Error(t("Choose recordings in the list above first."));
+  return { each, selection: Object.fromEntries(shown) };
 }
 
 async function analyse(event) {

@@ -3,14 +3,29 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import BigInteger, Float, ForeignKey, Index, LargeBinary, text
+from sqlalchemy import BigInteger, Float, ForeignKey, Index, LargeBinary, TextClause, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from bench_service.persistence.tables.columns import Document, Id, Table
 
 NAMES_JOIN = "\n"
+KEY_LENGTH = 500
+"""Most characters of a text that is the key of an index: Postgres takes 2704 bytes, and a character has up to four."""
 OF_A_TREND = ("unit", "name", "simulated", "id", "job_id", "created_at", "code_version")
 """Columns of results that a trend is found by, and what it shows of them: behind the document they are slow to read."""
+
+
+def _where(condition: TextClause) -> dict[str, TextClause]:
+    """Arguments of an index that has only the rows of a condition."""
+    return {"sqlite_where": condition, "postgresql_where": condition}
+
+
+def _short_and_long(column: str) -> tuple[Index, Index]:
+    """Indexes of a text without a bound: one has the short texts themselves, the other only the rows of long ones."""
+    return (
+        Index(f"ix_recordings_{column}_id", column, "id", **_where(text(f"length({column}) <= {KEY_LENGTH}"))),
+        Index(f"ix_recordings_long_{column}", "id", **_where(text(f"length({column}) > {KEY_LENGTH}"))),
+    )
 
 
 class UnitRow(Table):
@@ -43,14 +58,8 @@ class RecordingRow(Table):
         Index("ix_recordings_state_stored_bytes", "state", "stored_bytes"),
         Index("ix_recordings_simulated_id", "simulated", "id"),
         Index("ix_recordings_bench_id", "bench", "id"),
-        Index("ix_recordings_station_label_id", "station_label", "id"),
-        Index(
-            "ix_recordings_file_names_id",
-            "file_names",
-            "id",
-            sqlite_where=text("file_names IS NOT NULL"),
-            postgresql_where=text("file_names IS NOT NULL"),
-        ),
+        *_short_and_long("station_label"),
+        *_short_and_long("file_names"),
         Index("ix_recordings_raw_state_stored_bytes", "raw", "state", "stored_bytes"),
         Index(
             "uq_recordings_complete_station",

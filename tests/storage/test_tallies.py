@@ -1,0 +1,40 @@
+"""Gauges of jobs by state count each job once, in the state that it is in."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, cast
+
+from bench_service.api.metrics import Snapshot
+from bench_service.campaigns.stores import Stores
+from bench_service.jobs.events.hub import EventHub
+from bench_service.model.job import Failure, Job, JobState
+from bench_service.service import BenchService
+from bench_service.telemetry.tallies import Tallies
+from bench_service.wall_clock import now
+from procedures.core.limits import Verdict
+
+
+def test_a_job_that_failed_and_was_resumed_is_one_job(stores: Stores, new_job: Callable[..., Job]) -> None:
+    tallies = Tallies(stores.tallies)
+    snapshot = Snapshot(cast(BenchService, SimpleNamespace(stores=stores)), tallies, cast(EventHub, None))
+
+    def states() -> dict[str, float]:
+        tallies.update()
+        family = next(iter(snapshot.collect()))
+        assert family.name == "bench_jobs"
+        return {sample.labels["state"]: sample.value for sample in family.samples if sample.value}
+
+    job, cancelled = stores.jobs.add(new_job()), stores.jobs.add(new_job())
+
+    def moved(to: JobState, **more: Any) -> None:
+        stores.jobs.transition(job.id, to, at=now(), **more)
+
+    stores.jobs.transition(cancelled.id, JobState.CANCELLED, at=now())
+    moved(JobState.RUNNING)
+    moved(JobState.FAILED, failure=Failure("StorageFull", "the disk is full"))
+    assert states() == {"failed": 1, "cancelled": 1}
+    stores.jobs.resume(job.id, now())
+    assert states() == {"queued": 1, "cancelled": 1}
+    moved(JobState.RUNNING)
+    moved(JobState.SUCCEEDED, verdict=Verdict.PASS)
+    assert states() == {"succeeded": 1, "cancelled": 1}
