@@ -51,7 +51,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 METHOD = Method(
-    *("ferraris_calibration_of_recordings", "Calibration on six faces from recordings", "1.0.0"),
+    *("ferraris_calibration_of_recordings", "Calibration on six faces from recordings", "1.1.0"),
     *(Params, Result, analyse, ferraris.report, ferraris.calibrations),
     inspection=lambda _params, _count: STATIONS,
 )

@@ -19,6 +19,7 @@ from procedures.core.recording import TRIADS
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
+from procedures.core.unit_correction import CorrectionKind
 from procedures.multi_position import FitParameters, Inputs, Result
 from procedures.procedure import STATIONS, Evidence, Method, RecordedParameters
 
@@ -74,6 +75,13 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     require_correctable("current", min(r.info.duration_s for r in evidence.recordings), unit)
     lags = params.case_lag_s, params.converter_lag_s
     return multi_position.calibrated(evidence.recordings, params, inputs, unit, lags)
+
+
+def uses_corrections(result: Result) -> tuple[CorrectionKind, ...]:
+    """Kinds of the unit's current corrections that brought the triads of the result to their references."""
+    if result.thermal is None:
+        return ()
+    return ("thermal", "gyros") if any(t.calibration.triad == "gyro" for t in result.triads) else ("thermal",)
 
 
 def _from_directions(params: Params, recordings: int) -> Inputs:
@@ -148,7 +156,7 @@ METHOD = Method(
     analyse,
     multi_position.report,
     multi_position.calibrations,
-    uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
+    uses_corrections=uses_corrections,
     inspection=lambda params, _: replace(
         STATIONS, channels=tuple(channel for triad in params.triads for channel in TRIADS[triad])
     ),
