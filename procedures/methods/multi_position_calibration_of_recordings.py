@@ -35,6 +35,7 @@ class Params(FitParameters, RecordedParameters):
     gravity_m_s2: float = Field(ge=9.7, le=9.9)
     gravity_sd_m_s2: float = Field(1e-5, ge=0.0, le=0.01)
     latitude_deg: float | None = Field(None, ge=-90.0, le=90.0, description="needed by the gyros")
+    latitude_sd_arcsec: Arcsec = 0.0
     azimuth_deg: float = Field(0.0, ge=-360.0, le=360.0, description="heading of the table's zero")
     azimuth_sd_arcsec: Arcsec = 0.0
     positions: tuple[tuple[Angle, Angle, Angle], ...] | None = Field(
@@ -123,6 +124,7 @@ def _from_angles(evidence: Evidence, params: Params) -> dict[str, Inputs]:
         params.level_sd_arcsec,
         params.azimuth_sd_arcsec,
         params.gravity_sd_m_s2 / params.gravity_m_s2,
+        latitude_sd_arcsec=params.latitude_sd_arcsec,
     )
     return multi_position.inputs_at(params.triads, angles, site, uncertainty)
 
