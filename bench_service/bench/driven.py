@@ -43,8 +43,18 @@ class DrivenBench:
     `stop_wanted` is called every `STOP_CHECK_S` of real time; True raises `Stopped` in the work under way.
     """
 
-    def __init__(self, name: str, bench: Bench, stop_wanted: Callable[[], bool]) -> None:
-        """Set up and start the thread; `name`: names the job or lease in log lines."""
+    def __init__(
+        self,
+        name: str,
+        bench: Bench,
+        stop_wanted: Callable[[], bool],
+        stop_stands: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Set up and start the thread; `name`: names the job or lease in log lines.
+
+        `stop_stands`: returns whether a stop stands on the bench's channel, without waiting: no work begins then.
+        """
+        self._stop_stands = stop_stands
         self._name = name
         self._watchdog = Watchdog(bench.clock, bench.description.origin == "simulated", TIME_LIMITS)
         self._bench = ObservedBench(bench, self._watchdog)
@@ -70,7 +80,7 @@ class DrivenBench:
     def _run(self, work: Coroutine[Any, Any, T]) -> T:
         """Run work in the bench's thread and wait for its end. Raises `Stopped`, `Disconnected`, `ShuttingDown`."""
         with self._beginning:
-            if self._stopped.is_set():
+            if self._stopped.is_set() or self._stop_stands():
                 work.close()
                 raise Stopped(STOPPED)
             under_way = asyncio.run_coroutine_threadsafe(work, self._loop)
@@ -109,10 +119,10 @@ class DrivenBench:
         and `Disconnected` where a device does not answer. Once it is safe a second call does nothing.
         """
         with self._safety:
-            if self._is_safe or self._closed:
+            if self._is_safe:
                 return
-            if self._lost is not None:
-                raise Disconnected(self._lost)
+            if self._lost is not None or self._closed:
+                raise Disconnected(self._lost or "the session ended before its devices were safe")
             self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
             self._is_safe = True
 
@@ -192,12 +202,19 @@ class DrivenBench:
             return
         try:
             waiting.result(UNWIND_S)
+        except CancelledError:  # as above, a moment later
+            return
         except TimeoutError:
+            if self._closed:  # as above: its loop had stopped, and takes nothing more
+                return
             self._lost = why
             log.error("%s, bench %s: %s, and its driver does not return", self._name, self._bench.description.id, why)
 
     async def _unwound(self) -> None:
-        """Wait for every task of the bench's loop but those that wait here: two stops would wait for each other."""
+        """Wait for every task of the bench's loop but those that wait here, or that make safe.
+
+        Two stops would wait for each other, and braking may take longer than work takes to unwind.
+        """
         own = asyncio.current_task(self._loop)
         assert own is not None
         self._unwinding.add(own)
@@ -207,9 +224,15 @@ class DrivenBench:
             self._unwinding.discard(own)
 
     async def _make_safe(self) -> None:
+        own = asyncio.current_task(self._loop)
+        assert own is not None
+        self._unwinding.add(own)
         try:
             await self._leave()
         except Exception:  # a defect in the procedure's own ending says nothing of the devices
             log.exception("%s: its procedure's step could not be left in order", self._name)
         finally:
-            await self._bench.make_safe()
+            try:
+                await self._bench.make_safe()
+            finally:
+                self._unwinding.discard(own)

@@ -37,6 +37,11 @@ class Safety:
     supervisor: ProcessIdentity | None
     """The process of this host that supervises it, if one is alive."""
 
+    @property
+    def commanded(self) -> bool:
+        """True while a living worker has the devices' link: it would command them next, and leaves after a stop."""
+        return self.worker is not None and self.devices is not None and self.devices.linked
+
 
 class SafetyService:
     """Reads a bench's safety from its devices and processes on this host; for other hosts, from the database."""
@@ -88,7 +93,7 @@ class SafetyService:
 
     def _within(self, bench_id: str, found: Safety) -> Safety:
         deadline = monotonic_s() + STOPPING_S
-        while found.safe is not True and monotonic_s() < deadline:
+        while (found.safe is not True or found.commanded) and monotonic_s() < deadline:
             pause(LOOK_S)
             found = self.known(bench_id)
         return found

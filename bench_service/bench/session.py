@@ -32,8 +32,9 @@ class BenchSession(DrivenBench):
         recordings: RecordingStore,
         stop_wanted: Callable[[], bool],
         tap: LiveTap | None = None,
+        stop_stands: Callable[[], bool] = lambda: False,
     ) -> None:
-        super().__init__(f"job {job.id}", bench, stop_wanted)
+        super().__init__(f"job {job.id}", bench, stop_wanted, stop_stands)
         self.job = job
         self._procedure = procedure
         self._recordings = recordings

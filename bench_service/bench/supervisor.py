@@ -19,7 +19,7 @@ from bench_service.bench.devices import BenchDevices, DeviceState
 from bench_service.bench.heartbeat import SILENT_S, HeartbeatFile
 from bench_service.bench.make_safe import over_new_link
 from bench_service.bench.processes import Driving, ProcessIdentity, Watch
-from bench_service.bench.stop.channel import SUPERVISOR, StopChannel
+from bench_service.bench.stop.channel import SUPERVISOR, WORKER, StopChannel
 from bench_service.bench.stop.exchange import StopExchange
 from bench_service.bench.stop.word import StopAnswer
 from bench_service.bench.supervisor_ports import Lease, Listener, SafetyBooks
@@ -118,7 +118,7 @@ class Supervisor:
         if state is not None and state.safe:  # whichever process made it safe
             self._told_not_safe, self._first_try_s = False, None
         self._look_for_stop(now_s)
-        words = self._answer_stop(state)
+        words = self._answer_stop(state, alive)
         self._stopped = bool(words) or self._exchange.stopped
         if driving is not None and driving.alive:
             self._gone_since_s = None
@@ -157,8 +157,9 @@ class Supervisor:
         self._exchange.exchange()
         if self._listener is not None and (at := self._listener.listening()) is not None:
             self._books.say_listening(at)
-        state = self._devices.device_state()
-        if self._exchange.stopped and state is not None and state.safe:
+        driving, state = self._watch.driving(), self._devices.device_state()
+        commanded = state is not None and state.linked and driving is not None and driving.alive
+        if self._exchange.stopped and state is not None and state.safe and not commanded:
             self._books.confirm_safe(state.by)
         if self._unsaid_stop is not None:
             self._books.stop(self._unsaid_stop, self._by)
@@ -167,13 +168,14 @@ class Supervisor:
             self._books.note(self._by, *self._unsaid[0])
             self._unsaid.pop(0)
 
-    def _answer_stop(self, state: DeviceState | None) -> frozenset[str]:
+    def _answer_stop(self, state: DeviceState | None, alive: bool) -> frozenset[str]:
         """Answer the stop requests in the channel; their ids."""
         ids = frozenset(word.id for word in self._channel.standing())
         if ids:
             safe = self._channel.answered(SUPERVISOR).safe & ids
-            is_safe = state is not None and state.safe
-            self._channel.answer(SUPERVISOR, StopAnswer(self._by, ids, ids if is_safe else safe))
+            if state is not None and state.safe:  # a worker that has their link says itself when it has left its work
+                safe |= self._channel.answered(WORKER).safe & ids if alive and state.linked else ids
+            self._channel.answer(SUPERVISOR, StopAnswer(self._by, ids, safe))
         return ids
 
     def _end_hung(self, now_s: float, driving: Driving, state: DeviceState | None, words: frozenset[str]) -> None:

@@ -295,5 +295,5 @@ class JobRunner:
             self._spread.begin_for(job.stations, bench.imu)
         live = None if self._live is None else LiveTap(job, bench, self._live)
         stop_wanted = partial(self._stop_wanted, job.id)
-        self._session = BenchSession(job, procedure, bench, self._stores.recordings, stop_wanted, live)
+        self._session = BenchSession(job, procedure, bench, self._stores.recordings, stop_wanted, live, self._stopped)
         return self._session

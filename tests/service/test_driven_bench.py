@@ -1,14 +1,16 @@
 """A stop at any moment of a job's work: once it has returned, the work gives no further demand to a device."""
 
+import asyncio
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from concurrent.futures import Future
 from contextlib import suppress
 from threading import Thread
 
 import pytest
 
-from bench_service.bench.driven import DrivenBench
-from procedures.bench.errors import Stopped
+from bench_service.bench.driven import UNWIND_S, DrivenBench
+from procedures.bench.errors import Disconnected, Stopped
 from simulators.world import WorldConfig, build
 
 ROUNDS = 200
@@ -18,8 +20,8 @@ ROUNDS = 200
 class Worker(DrivenBench):
     """Looks at the table again and again, as a procedure does, and counts its looks."""
 
-    def __init__(self) -> None:
-        super().__init__("a job", build(WorldConfig()), lambda: False)
+    def __init__(self, stop_stands: Callable[[], bool] = lambda: False) -> None:
+        super().__init__("a job", build(WorldConfig()), lambda: False, stop_stands)
         self.looks = 0
 
     def work(self) -> None:
@@ -90,3 +92,45 @@ def test_a_defect_in_a_procedures_ending_does_not_keep_the_devices_from_being_sa
     worker.close()
     assert "a job: its procedure's step could not be left in order" in caplog.text
     assert "cannot divide" in caplog.text
+
+
+def test_no_work_begins_while_a_stop_stands_on_the_channel_though_nobody_has_told_the_session() -> None:
+    """A stop may come while the devices are still being opened: there is no session yet that could be told."""
+    standing: list[bool] = []
+    worker = Worker(lambda: bool(standing))
+    worker._run(worker._look())
+    standing.append(True)
+    looks = worker.looks
+    with pytest.raises(Stopped):
+        worker._run(worker._look())
+    assert worker.looks == looks
+    worker.make_safe()
+    worker.close()
+
+
+class Slow(Worker):
+    """Its table takes longer to brake than work takes to unwind."""
+
+    async def _leave(self) -> None:
+        await asyncio.sleep(1.5 * UNWIND_S)
+
+
+def test_a_stop_while_the_jobs_own_thread_makes_safe_is_not_taken_for_a_lost_driver() -> None:
+    worker = Slow()
+    worker._run(worker._look())
+    job = Thread(target=worker.make_safe)
+    job.start()
+    while not worker._unwinding:
+        pass
+    worker._under_way = Future()  # as a stop reads it that comes while the job's step ends
+    worker.stop()
+    job.join(10)
+    assert worker._lost is None
+    worker.close()
+
+
+def test_a_session_that_ended_before_it_was_safe_does_not_say_that_it_is() -> None:
+    worker = Worker()
+    worker.close()
+    with pytest.raises(Disconnected, match="ended before its devices were safe"):
+        worker.make_safe()

@@ -36,8 +36,9 @@ class StopGuard:
     ) -> None:
         """Set up with `is_safe`: the devices' reported state; and `make_safe`: leaves the job and makes the bench safe.
 
-        `make_safe` may take a while, and is called again while a stop stands and the bench is not safe. `wake`: called
-        when there may be something to do.
+        `make_safe` is called at least once for each stop, also where the devices are safe when it comes: a job that
+        has their link would command them next. It may take a while, and is called again while a stop stands and the
+        bench is not safe. `wake`: called when there may be something to do.
         """
         self._channel = channel
         self._heartbeat = heartbeat
@@ -47,6 +48,8 @@ class StopGuard:
         self._by = f"the worker, {ProcessIdentity.own()}"
         self._ending = Event()
         self._acting: Thread | None = None
+        self._left: frozenset[str] = frozenset()
+        """Stops for which the work under way was left."""
         self._next_beat_s = 0.0
         self._beats = True
         self._socket: socket.socket | None = None
@@ -96,18 +99,21 @@ class StopGuard:
         if not words:
             return
         ids = frozenset(word.id for word in words)
-        safe = self._is_safe()
+        left = self._left  # before the devices are looked at: what was left cannot command them afterwards
+        safe = ids & left if self._is_safe() else frozenset[str]()
         said = self._channel.answered(WORKER)
-        self._channel.answer(WORKER, StopAnswer(self._by, ids, ids if safe else said.safe & ids))
-        if not safe and (self._acting is None or not self._acting.is_alive()):
-            self._acting = Thread(target=self._act, name="stop", daemon=True)
+        self._channel.answer(WORKER, StopAnswer(self._by, ids, safe | (said.safe & ids)))
+        if safe != ids and (self._acting is None or not self._acting.is_alive()):
+            self._acting = Thread(target=self._act, args=(ids,), name="stop", daemon=True)
             self._acting.start()
 
-    def _act(self) -> None:
+    def _act(self, ids: frozenset[str]) -> None:
         try:
             self._make_safe()
         except Exception:  # tried again at the next look
             log.exception("bench %s could not be made safe", self._channel.bench_id)
+        else:
+            self._left = ids
 
     def _beat(self) -> None:
         now_s = monotonic_s()
