@@ -42,10 +42,14 @@ class StopAt(Parameters):
             raise ValueError("gyro_deg_h or accelerometer_m_s2 is needed: without a target nothing ends a dwell")
         return self
 
-    def resolved(self, unit: Unit) -> "StopAt":
-        """The target with its rule, by the noise of the unit's record. Raises `BadParameter` where that is unknown."""
+    def resolved(self, unit: Unit, least_s: float = 0.0) -> "StopAt":
+        """The target with its rule, by the noise of the unit's record. Raises `BadParameter` where that is unknown.
+
+        `least_s`: no dwell ends before it, also under a rule that was given.
+        """
         if self.rule is not None:
-            return self
+            rule = replace(self.rule, least_s=max(self.rule.least_s, least_s))
+            return self.model_copy(update={"rule": rule})
         asked = {
             "gyro": ("gyro_deg_h", self.gyro_deg_h, units.DEG_PER_HOUR),
             "accelerometer": ("accelerometer_m_s2", self.accelerometer_m_s2, 1.0),
@@ -61,7 +65,7 @@ class StopAt(Parameters):
             targets += [
                 ChannelTarget(n, value * size, noise) for n, noise in zip(TRIADS[triad], record.noise, strict=True)
             ]
-        rule = StopRule(tuple(targets), self.check_s, self.level)
+        rule = StopRule(tuple(targets), self.check_s, self.level, least_s)
         return self.model_copy(update={"rule": rule})
 
     def warnings(self, longest_s: float) -> tuple[str, ...]:
@@ -82,9 +86,14 @@ class DwellParameters(Parameters):
         None, description="end each dwell once the uncertainty of its means is this small; dwell_s is the longest"
     )
 
-    def with_rule(self, unit: Unit) -> Self:
-        """The parameters with the rule by the unit's own noise. Raises `BadParameter` where that is not known."""
-        return self if self.stop_at is None else self.model_copy(update={"stop_at": self.stop_at.resolved(unit)})
+    def with_rule(self, unit: Unit, least_s: float = 0.0) -> Self:
+        """The parameters with the rule by the unit's own noise; `least_s`: no dwell ends before it.
+
+        Raises `BadParameter` where that noise is not known.
+        """
+        if self.stop_at is None:
+            return self
+        return self.model_copy(update={"stop_at": self.stop_at.resolved(unit, least_s)})
 
     @property
     def until(self) -> StopRule | None:

@@ -254,8 +254,8 @@ class Method(Generic[P, R]):
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
-    uses_corrections: Callable[[P], tuple[CorrectionKind, ...]] = _uses_none
-    """Kinds of the unit's current corrections that the result rests on; those it has then belong to its lineage."""
+    uses_corrections: Callable[[R], tuple[CorrectionKind, ...]] = _uses_none
+    """Kinds of the unit's current corrections that were applied for a result; they then belong to its lineage."""
     planned_checks: Callable[[P, Unit, Planned], tuple[PlannedCheck, ...]] = _no_checks_of_method
     """Checks that a result will have, from the plans of the calibrations that it is to work on."""
     inspection: Callable[[P, int], Inspection] = _at_rest

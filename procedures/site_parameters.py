@@ -18,7 +18,9 @@ from procedures.procedure import Context, JudgedParameters
 Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
 
 
-BudgetSource = Literal["noise", "orthogonality", "pointing", "level", "azimuth", "gravity", "thermometers", "mounting"]
+BudgetSource = Literal[
+    "noise", "orthogonality", "pointing", "level", "azimuth", "gravity", "thermometers", "mounting", "latitude"
+]
 
 
 def _records(context: Context) -> tuple[TriadRecord | None, TriadRecord | None]:
@@ -36,12 +38,17 @@ class SiteParameters(JudgedParameters):
         None, ge=0.0, le=0.01, exclude_if=lambda sd: sd is None, description="standard uncertainty of gravity"
     )
 
+    latitude_sd_arcsec: Arcsec | None = Field(
+        None, exclude_if=lambda sd: sd is None, description="standard uncertainty of the latitude, which gyros feel"
+    )
+
     def site(self, context: Context) -> Site:
         """The bench's site with the values that these parameters override."""
         found = site_with(
             context.bench.site, self.latitude_deg, self.gravity_m_s2, self.azimuth_deg, self.azimuth_sd_arcsec
         )
-        return found if self.gravity_sd_m_s2 is None else replace(found, gravity_sd_m_s2=self.gravity_sd_m_s2)
+        given = {"gravity_sd_m_s2": self.gravity_sd_m_s2, "latitude_sd_arcsec": self.latitude_sd_arcsec}
+        return replace(found, **{name: value for name, value in given.items() if value is not None})
 
 
 class TableParameters(SiteParameters):
@@ -64,7 +71,7 @@ class TableParameters(SiteParameters):
     )
     budget_sources: tuple[BudgetSource, ...] = Field(
         (),
-        max_length=8,
+        max_length=9,
         exclude_if=lambda sources: not sources,
         description="sources that the uncertainty budget must have: each needs a value above 0 of the parameters, the "
         "bench or the unit",
@@ -79,6 +86,7 @@ class TableParameters(SiteParameters):
             site.azimuth_sd_arcsec,
             site.gravity_sd_m_s2 / site.gravity_m_s2,
             self.mounting_sd_arcsec or 0.0,
+            site.latitude_sd_arcsec,
         )
 
     def require_sources(self, context: Context, corrected: bool) -> None:
@@ -94,6 +102,7 @@ class TableParameters(SiteParameters):
             "gravity": (site.gravity_sd_m_s2, "gravity_sd_m_s2"),
             "thermometers": (float(corrected), "thermal_correction=current, whose thermometers they are"),
             "mounting": (self.mounting_sd_arcsec, "mounting_sd_arcsec"),
+            "latitude": (site.latitude_sd_arcsec, "latitude_sd_arcsec"),
         }
         for source in self.budget_sources:
             value, way_out = values[source]

@@ -148,7 +148,7 @@ class AnalysisService:
         corrections = method.corrections(outcome)
         if corrections and inputs.serial is None:
             raise BadParameter("unit", None, "the serial of the unit whose correction this is to be")
-        kinds = () if inputs.unit is None else method.uses_corrections(inputs.params)
+        kinds = () if inputs.unit is None else method.uses_corrections(outcome)
         applied = [inputs.unit.correction_id(kind) for kind in kinds if inputs.unit is not None]
         stored = StoredResult(
             id=new_id(),

@@ -64,7 +64,8 @@ class CorrectionStore(Protocol):
     ) -> StoredCorrection:
         """Choose the correction that new jobs use; it supersedes the current one of its kind.
 
-        A known key with the same fingerprint changes nothing. Raises `NotFound`, `IdempotencyConflict`.
+        A known key with the same fingerprint changes nothing. Raises `NotFound`, `IdempotencyConflict`, and
+        `CorrectionRefused` for one of a result that did not pass where there is no remark.
         """
         ...
 

@@ -6,6 +6,7 @@ ServiceError
 ├── IdempotencyConflict  the key was used before with another request
 ├── NameTaken            a campaign of that name exists already
 ├── CalibrationRefused   a calibration may not become the one that counts
+├── CorrectionRefused    a correction may not become the one that counts
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
@@ -64,6 +65,10 @@ class NameTaken(ServiceError):
 
 class CalibrationRefused(ServiceError):
     """Raised where a calibration may not become its triad's current one; the message has the way out."""
+
+
+class CorrectionRefused(ServiceError):
+    """Raised where a correction may not become its kind's current one; the message has the way out."""
 
 
 class BenchBusy(ServiceError):

@@ -16,7 +16,7 @@ from procedures import steps
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.plan import TriadPlan, basis, triad_plan
 from procedures.analysis.calibration.reference import TRIAD_NAMES
-from procedures.analysis.calibration.reference_temperature import ThermalShare, require_correctable
+from procedures.analysis.calibration.reference_temperature import ThermalShare, least_dwell_s, require_correctable
 from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
@@ -119,7 +119,7 @@ def resolve(params: Params, context: Context) -> Params:
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
     full.require_sources(context, full.thermal_correction == "current")
-    return full.with_rule(context.unit)
+    return full.with_rule(context.unit, least_dwell_s(full.thermal_correction))
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -277,7 +277,7 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
 
 
 PROCEDURE = Procedure(
-    *("calibration_12_orientations", "Calibration in twelve orientations", "1.5.0"),
+    *("calibration_12_orientations", "Calibration in twelve orientations", "1.6.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
     uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
     quantities=quantities,

@@ -148,7 +148,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
 
 
 PROCEDURE = Procedure(
-    *("ferraris_calibration", "Calibration on six faces, by rests and turns", "1.0.0"),
+    *("ferraris_calibration", "Calibration on six faces, by rests and turns", "1.1.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, ferraris.report, ferraris.calibrations),
     quantities=quantities,
     planned_checks=planned_checks,

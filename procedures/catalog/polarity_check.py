@@ -148,7 +148,7 @@ def _checks(found: Answers, limits: Limits) -> list[Check]:
 PROCEDURE = Procedure(
     "polarity_check",
     "Polarity check of both triads",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     resolve,

@@ -207,7 +207,7 @@ def _plan(params: Params, context: Context) -> TurnPlan:
     site = _site(params, context)
     right, pointing = params.orthogonality_sd_arcsec or 0.0, params.pointing_sd_arcsec or 0.0
     level, azimuth = context.bench.accuracy.level_sd_arcsec, site.azimuth_sd_arcsec
-    uncertainty = TableUncertainty(right, pointing, level, azimuth)
+    uncertainty = TableUncertainty(right, pointing, level, azimuth, latitude_sd_arcsec=site.latitude_sd_arcsec)
     reference = params.reference_rate_deg_s or max(params.rates_deg_s)
     return TurnPlan(
         _program(params),

@@ -188,7 +188,7 @@ def _origins(unit: Unit) -> str:
 PROCEDURE = Procedure(
     "static_run",
     "Static launches",
-    "1.1.0",
+    "1.2.0",
     Params,
     Result,
     resolve,

@@ -196,7 +196,12 @@ def corrections(result: Result) -> tuple[UnitCorrection, ...]:
 
 
 def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
-    """Kinds of corrections used: sensors and stage one first; the unit's own as judged or for comparison."""
+    """Kinds of corrections used: sensors and stage one first, and the unit's own for comparison.
+
+    Where the unit's own is judged, stage one and sensors are those that it was fitted with: parts of it.
+    """
+    if params.correction == "current":
+        return ("thermal",)
     return ("converter", "thermal", *(("thermometers",) if params.thermometers == "current" else ()))
 
 

@@ -14,7 +14,7 @@ from pydantic import Field
 from procedures import chamber_steps
 from procedures.analysis.fitness.watched import Inspection
 from procedures.analysis.thermal.profile_progress import SENSORS
-from procedures.analysis.thermal.thermometers import Calibrated, Soaked, SoakSettings, calibrate, read_soaks
+from procedures.analysis.thermal.thermometers import Calibrated, Soaked, SoakSettings, both_ways, calibrate, read_soaks
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
@@ -184,8 +184,9 @@ def planned_checks(params: Params, _context: Context) -> tuple[PlannedCheck, ...
     level, source = params.limits.level, "ours: a test of significance"
     each = Limit("1", minimum=level / len(SENSORS), source=source)
     found = [PlannedCheck(f"{name} {LINE}", each, level=level / len(SENSORS)) for name in SENSORS]
-    if len(set(params.temperatures_c)) < len(params.temperatures_c):
-        found.append(PlannedCheck(PATH, Limit("1", minimum=level, source=source), level=level))
+    pairs = len(SENSORS) * len(both_ways(params.temperatures_c))
+    if pairs:
+        found.append(PlannedCheck(PATH, Limit("1", minimum=level / pairs, source=source), level=level))
     return tuple(found)
 
 

@@ -22,7 +22,7 @@ from procedures import steps
 from procedures.analysis.calibration.diagnosis import LIKELY_P_VALUE
 from procedures.analysis.calibration.plan import TriadPlan, basis, triad_plan
 from procedures.analysis.calibration.reference import TRIAD_NAMES
-from procedures.analysis.calibration.reference_temperature import require_correctable
+from procedures.analysis.calibration.reference_temperature import least_dwell_s, require_correctable
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.calibration.table_errors import TableUncertainty
@@ -106,7 +106,7 @@ def resolve(params: Params, context: Context) -> Params:
     """Dwell from the unit; site and table from the bench. Refuses a correction that the unit does not have."""
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
-    return full.with_rule(context.unit)
+    return full.with_rule(context.unit, least_dwell_s(full.thermal_correction))
 
 
 def schedule(params: Params) -> tuple[Station, ...]:

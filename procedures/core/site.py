@@ -19,6 +19,8 @@ class Site:
     azimuth_sd_arcsec: float = 0.0
     gravity_sd_m_s2: float = 0.0
     earth_rate_rad_s: float = units.EARTH_RATE
+    latitude_sd_arcsec: float = 0.0
+    """Standard uncertainty of the latitude; 0: none is declared, and no budget has a row for it."""
 
     def __post_init__(self) -> None:
         for name, low, high in (
@@ -28,6 +30,7 @@ class Site:
             ("azimuth_sd_arcsec", 0.0, 3600.0),
             ("gravity_sd_m_s2", 0.0, 0.01),
             ("earth_rate_rad_s", 7.0e-5, 7.6e-5),
+            ("latitude_sd_arcsec", 0.0, 3600.0),
         ):
             value = getattr(self, name)
             if not low <= value <= high:

@@ -29,6 +29,8 @@ class StopRule:
     """Interval at which the means are looked at; a dwell is a whole number of it."""
     level: float = 1e-3
     """A dwell whose innovations are less likely than this under the declared noise continues to its longest time."""
+    least_s: float = 0.0
+    """Duration before which no dwell ends, for what is read at the same time (temperatures need a line)."""
 
     def __post_init__(self) -> None:
         if not self.targets:
@@ -37,3 +39,5 @@ class StopRule:
             raise BadParameter("check_s", self.check_s, "within 0.1 … 3600 s")
         if not 0.0 <= self.level < 0.5:
             raise BadParameter("level", self.level, "within 0 … 0.5")
+        if not 0.0 <= self.least_s <= 86_400.0:
+            raise BadParameter("least_s", self.least_s, "within 0 … 86 400 s")

@@ -227,7 +227,7 @@ def inspection(params: Params, count: int) -> Inspection:
 METHOD = Method(
     "allan_deviation",
     "Allan deviation and its relatives",
-    "1.1.0",
+    "1.2.0",
     Params,
     Result,
     analyse,

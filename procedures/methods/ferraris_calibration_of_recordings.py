@@ -26,6 +26,7 @@ class Params(RecordedParameters):
     gravity_m_s2: float = Field(ge=9.7, le=9.9)
     azimuth_deg: float = Field(0.0, ge=-360.0, le=360.0, description="heading of the table's zero")
     azimuth_sd_arcsec: float = Field(5.0, ge=0.0, le=3600.0)
+    latitude_sd_arcsec: float = Field(0.0, ge=0.0, le=3600.0)
     gravity_sd_m_s2: float = Field(1e-5, ge=0.0, le=0.01)
     orthogonality_sd_arcsec: float = Field(3.0, ge=0.0, le=3600.0)
     pointing_sd_arcsec: float = Field(1.0, ge=0.0, le=3600.0)
@@ -44,6 +45,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
         params.level_sd_arcsec,
         params.azimuth_sd_arcsec,
         params.gravity_sd_m_s2 / params.gravity_m_s2,
+        latitude_sd_arcsec=params.latitude_sd_arcsec,
     )
     in_time: Sequence[Recording] = sorted(evidence.recordings, key=lambda r: r.info.start_s)
     found = ferraris.calibrated(in_time, site, table, unit, params.limits)
@@ -51,7 +53,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 METHOD = Method(
-    *("ferraris_calibration_of_recordings", "Calibration on six faces from recordings", "1.0.0"),
+    *("ferraris_calibration_of_recordings", "Calibration on six faces from recordings", "1.1.0"),
     *(Params, Result, analyse, ferraris.report, ferraris.calibrations),
     inspection=lambda _params, _count: STATIONS,
 )

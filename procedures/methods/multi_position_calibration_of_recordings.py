@@ -19,6 +19,7 @@ from procedures.core.recording import TRIADS
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
+from procedures.core.unit_correction import CorrectionKind
 from procedures.multi_position import FitParameters, Inputs, Result
 from procedures.procedure import STATIONS, Evidence, Method, RecordedParameters
 
@@ -34,6 +35,7 @@ class Params(FitParameters, RecordedParameters):
     gravity_m_s2: float = Field(ge=9.7, le=9.9)
     gravity_sd_m_s2: float = Field(1e-5, ge=0.0, le=0.01)
     latitude_deg: float | None = Field(None, ge=-90.0, le=90.0, description="needed by the gyros")
+    latitude_sd_arcsec: Arcsec = 0.0
     azimuth_deg: float = Field(0.0, ge=-360.0, le=360.0, description="heading of the table's zero")
     azimuth_sd_arcsec: Arcsec = 0.0
     positions: tuple[tuple[Angle, Angle, Angle], ...] | None = Field(
@@ -76,6 +78,13 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     return multi_position.calibrated(evidence.recordings, params, inputs, unit, lags)
 
 
+def uses_corrections(result: Result) -> tuple[CorrectionKind, ...]:
+    """Kinds of the unit's current corrections that brought the triads of the result to their references."""
+    if result.thermal is None:
+        return ()
+    return ("thermal", "gyros") if any(t.calibration.triad == "gyro" for t in result.triads) else ("thermal",)
+
+
 def _from_directions(params: Params, recordings: int) -> Inputs:
     if params.positions is not None:
         raise BadParameter(
@@ -115,6 +124,7 @@ def _from_angles(evidence: Evidence, params: Params) -> dict[str, Inputs]:
         params.level_sd_arcsec,
         params.azimuth_sd_arcsec,
         params.gravity_sd_m_s2 / params.gravity_m_s2,
+        latitude_sd_arcsec=params.latitude_sd_arcsec,
     )
     return multi_position.inputs_at(params.triads, angles, site, uncertainty)
 
@@ -148,7 +158,7 @@ METHOD = Method(
     analyse,
     multi_position.report,
     multi_position.calibrations,
-    uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
+    uses_corrections=uses_corrections,
     inspection=lambda params, _: replace(
         STATIONS, channels=tuple(channel for triad in params.triads for channel in TRIADS[triad])
     ),

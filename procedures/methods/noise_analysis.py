@@ -31,7 +31,7 @@ def report(result: Result) -> Report:
 METHOD = Method(
     "noise_analysis",
     "Noise of recordings at rest",
-    "1.1.0",
+    "1.2.0",
     Params,
     Result,
     analyse,

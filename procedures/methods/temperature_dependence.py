@@ -112,8 +112,9 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     names = _channels(recordings, params)
     if params.order is not None and params.cell_s * FEWEST > min(r.info.duration_s for r in recordings):
         raise BadParameter("cell_s", params.cell_s, f"so short that every recording has {FEWEST} cells")
-    known = unit.thermometers if unit is not None and params.thermometers else None
     sensors = {name: _sensor(recordings, name, params) for name in names}
+    known = unit.thermometers if unit is not None and params.thermometers else None
+    applied = known is not None and any(known.has(sensor) for sensor in sensors.values())
     series = [_series(recording, sensors, params, unit) for recording in recordings]
     found = [_channel(recordings[0].info, name, sensors[name], [s[name] for s in series], params) for name in names]
     level, source = params.level / len(names), "ours: no dependence on temperature"
@@ -127,7 +128,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
         channels=tuple(c for c, _ in found),
         reference_c=params.reference_c,
         range_c=(float(min(t.min() for t in temperatures)), float(max(t.max() for t in temperatures))),
-        thermometers=(unit.thermometers_id or "") if unit is not None and known is not None else "",
+        thermometers=(unit.thermometers_id or "") if unit is not None and applied else "",
         gyro_correction=_gyros([c for c, _ in found], temperatures, params, unit),
         trace_c=tuple(tuple((s.departure_c + params.reference_c).tolist()) for s in found[0][1]),
     )
@@ -276,5 +277,6 @@ METHOD = Method(
     *("temperature_dependence", "Dependence of recordings on temperature", "1.1.0"),
     *(Params, Result, analyse, report),
     corrections=corrections,
+    uses_corrections=lambda result: ("thermometers",) if result.thermometers else (),
     inspection=lambda params, _: Inspection(replace(STATIONS.settings, least_samples=FEWEST), params.channels),
 )

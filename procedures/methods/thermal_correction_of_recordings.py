@@ -115,7 +115,8 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     form = Form.SINGLE if len(sensors) == 1 else Form.BOTH
     reference = params.reference_case_c, params.reference_converter_c if len(sensors) == 2 else params.reference_case_c
     calibration = None if unit is None else unit.calibration("accelerometer")
-    if calibration is not None and calibration.output_unit == "m/s^2":
+    uncalibrated = calibration is None or calibration.output_unit != "m/s^2"
+    if calibration is not None and not uncalibrated:
         runs = felt_forces(runs, reference, calibration, form)
     lag_sds = (0.0, params.lag_sd_s) if form is Form.SINGLE else (params.lag_sd_s, params.lag_sd_s)
     found, fits = fit_correction(runs, reference, form, lag_sds)
@@ -127,7 +128,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     return Result(
         checks=checks,
         verdict=verdict(checks),
-        warnings=_warnings(axes, runs, calibration is None, stage is None, len(sensors)),
+        warnings=_warnings(axes, runs, uncalibrated, stage is None, len(sensors)),
         correction=correction,
         axes=axes,
         sensors=sensors,
@@ -140,11 +141,11 @@ def corrections(result: Result) -> tuple[UnitCorrection, ...]:
     return (UnitCorrection("thermal", result.correction),)
 
 
-def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
-    """Kinds of the unit's current corrections that are taken out first."""
+def uses_corrections(result: Result) -> tuple[CorrectionKind, ...]:
+    """Kinds of the unit's current corrections that were taken out first."""
     kinds: tuple[tuple[CorrectionKind, bool], ...] = (
-        ("thermometers", params.thermometers),
-        ("converter", params.converter),
+        ("thermometers", result.correction.thermometers is not None),
+        ("converter", result.correction.first_stage is not None),
     )
     return tuple(kind for kind, used in kinds if used)
 

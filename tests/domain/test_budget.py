@@ -140,7 +140,11 @@ def test_a_source_without_a_value_is_refused_by_name(source: str, parameters: di
 
 
 def test_a_calibration_on_the_bench_has_the_budget_that_it_states() -> None:
-    wanted = {"budget_sources": ["noise", "azimuth", "gravity", "mounting"], "gravity_sd_m_s2": 2e-5}
+    wanted = {
+        "budget_sources": ["noise", "azimuth", "gravity", "mounting", "latitude"],
+        "gravity_sd_m_s2": 2e-5,
+        "latitude_sd_arcsec": 5.0,
+    }
     procedure = discover()["calibration_12_orientations"]
     result = run(procedure, seed=5, dwell_s=5.0, settle_s=0.5, mounting_sd_arcsec=3.0, **wanted)
     for triad in result.triads:
@@ -148,7 +152,8 @@ def test_a_calibration_on_the_bench_has_the_budget_that_it_states() -> None:
             assert budget.coefficient == coefficient.name
             assert budget.standard_uncertainty == pytest.approx(coefficient.standard_uncertainty, rel=1e-9)
     gyro, force = ({r.source for b in t.budgets for r in b.rows} for t in result.triads)
-    assert "azimuth" in gyro
+    assert {"azimuth", "latitude"} <= gyro
+    assert "latitude" not in force
     assert {"gravity", "mounting"} <= force
     tables = [s.title for s in procedure.report(result).sections if hasattr(s, "rows")]
     assert "Uncertainty budget of the gyro triad" in tables

@@ -129,6 +129,12 @@ def test_recordings_without_turns_or_rests_are_refused(recordings: list[MemoryRe
     found = method.analyse(Evidence(tuple(recordings[::-1])), given, context.unit)
     assert found.gyro.p_value is not None
     assert found.gyro.coefficients[0].name == "gyro.b_x"
+    known = method.analyse(Evidence(tuple(recordings)), given.model_copy(update={"latitude_sd_arcsec": 60.0}), None)
+    for budget, stated in zip(known.gyro.budgets, known.gyro.coefficients, strict=True):
+        (row,) = [r for r in budget.rows if r.source == "latitude"]
+        assert (row.value, row.unit) == (60.0, "arcsec")
+        assert row.contribution == pytest.approx(stated.from_table_source["latitude"], rel=1e-9)
+        assert budget.standard_uncertainty == pytest.approx(stated.standard_uncertainty, rel=1e-9)
     turning = [r for i, r in enumerate(recordings) if i % 3]
     for kind, kept in (("of whole turns", recordings[::3]), ("at rest", turning)):
         with pytest.raises(UnfitRecording, match=f"no recording {kind}"):

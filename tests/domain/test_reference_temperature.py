@@ -152,7 +152,9 @@ def test_recordings_without_a_bench_are_brought_to_the_reference_by_the_units_co
         found.triads[0].calibration.standard_uncertainties, expected.calibration.standard_uncertainties, rtol=1e-6
     )
     assert found.thermal == share
-    assert method.uses_corrections(params) == ("thermal", "gyros")
+    assert method.uses_corrections(found) == ("thermal",), "no gyros were calibrated"
+    plain = method.analyse(Evidence(tuple(data)), params.model_copy(update={"thermal_correction": "none"}), unit)
+    assert method.uses_corrections(plain) == ()
     cold = replace(correction, fitted_range=TemperatureRange((-40.0, 30.0), (-40.0, 30.0)))
     beyond = method.analyse(Evidence(tuple(data)), params, replace(unit, thermal_correction=cold))
     assert any("beyond the range" in w for w in beyond.warnings)

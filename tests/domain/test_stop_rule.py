@@ -10,8 +10,10 @@ import pytest
 from pydantic import ValidationError
 
 from procedures import catalog
+from procedures.analysis.calibration.reference_temperature import LEAST_DWELL_S
 from procedures.analysis.recursive_bias.dwell import LiveDwell, expected_s, mean_sd
 from procedures.catalog import calibration_12_orientations as calibration
+from procedures.catalog import verification_9_orientations as verification
 from procedures.catalog.calibration_12_orientations import Params
 from procedures.core.errors import BadParameter, MissingChannel
 from procedures.core.imu_model import triad_calibration
@@ -21,6 +23,7 @@ from procedures.core.stop_rule import ChannelTarget, StopRule
 from procedures.procedure import Context
 from simulators.truth import declared_unit, default_bench, default_unit
 from simulators.world import WorldConfig, build
+from tests.correction_samples import thermal
 
 RATE_HZ = 20.0
 NOISE = NoiseCoefficients(quantization=2e-6, random_walk=4e-7)
@@ -151,6 +154,34 @@ def test_a_calibration_ends_its_dwells_and_tells_what_it_saved():
     claimed = np.sqrt(np.diag(np.array(result.triads[0].calibration.covariance)))[0]
     predicted = next(u for u in planned.uncertainties if u.name == "gyro.b_x")
     assert claimed == pytest.approx(predicted.standard_uncertainty, rel=0.2)
+
+
+def test_no_dwell_ends_before_what_is_read_with_it_needs():
+    """A target that a second reaches, looked at every 0.12 s, which whole samples at 20 Hz make 0.1 s."""
+    record = samples(np.random.Generator(np.random.PCG64(3)), 30.0)
+    quick = replace(rule(1.0), check_s=0.12)
+    assert expected_s(quick, 30.0) < 2.0
+    assert dwelt(quick, record) < 2.0 * RATE_HZ
+    held = replace(quick, least_s=10.0)
+    assert 10.0 <= expected_s(held, 30.0) < 10.2
+    assert dwelt(held, record) == 10.0 * RATE_HZ
+    with pytest.raises(BadParameter, match="least_s"):
+        replace(quick, least_s=-1.0)
+
+
+@pytest.mark.parametrize("procedure", [calibration, verification], ids=lambda p: p.PROCEDURE.name)
+def test_dwells_with_temperatures_are_at_least_as_long_as_their_line(procedure):
+    """Accelerometers alone reach such a target within a second, and their temperatures were refused after the job."""
+    warm = replace(CONTEXT, unit=replace(CONTEXT.unit, thermal_correction=thermal(1).thermal))
+    asked = {"dwell_s": 60.0, "stop_at": {"accelerometer_m_s2": 0.1, "check_s": 0.5}}
+    plain = procedure.resolve(procedure.Params.model_validate(asked), warm)
+    assert plain.stop_at.expected_s(60.0) == 0.5
+    params = procedure.resolve(procedure.Params.model_validate({**asked, "thermal_correction": "current"}), warm)
+    assert {s.until.least_s for s in procedure.schedule(params)} == {LEAST_DWELL_S}
+    assert params.stop_at.expected_s(60.0) == LEAST_DWELL_S
+    again = {**asked["stop_at"], "rule": plain.stop_at.rule}
+    given = procedure.Params.model_validate({**asked, "stop_at": again, "thermal_correction": "current"})
+    assert procedure.resolve(given, warm).stop_at.expected_s(60.0) == LEAST_DWELL_S
 
 
 def test_without_a_rule_nothing_changes():

@@ -1,5 +1,7 @@
 """Sensitivities to the table's flaws against a table built from rotation matrices with those flaws in it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,26 @@ def test_each_flaw_moves_the_vectors_as_a_real_table_would(triad: str, column: i
         assert errors.sensitivity[i, :, k] * SMALL * units.DEG == pytest.approx(
             moved, abs=1e-5 * SMALL * units.DEG * size
         )
+
+
+@pytest.mark.parametrize("latitude_deg", [-50.0, 0.0, 50.0, 89.9])
+def test_the_latitude_moves_the_earths_rate_alone(latitude_deg: float):
+    """By central difference of the site over 20″, whose error is beneath 1e-8 of Ω a radian."""
+    declared, step = TableUncertainty(latitude_sd_arcsec=2.0), 10.0 / 3600.0
+    site = replace(SITE, latitude_deg=latitude_deg)
+    south, north = (replace(site, latitude_deg=latitude_deg + d) for d in (-step, step))
+    vectors = reference_vectors("gyro", ANGLES, site)
+    moved = reference_vectors("gyro", ANGLES, north) - reference_vectors("gyro", ANGLES, south)
+    errors = table_errors(ANGLES, vectors, declared, of_gravity=False)
+    assert errors.source[-1] == "latitude"
+    assert errors.sd[-1] == pytest.approx(2.0 * units.ARCSEC)
+    expected = moved / (2.0 * step * units.DEG)
+    assert errors.sensitivity[:, :, -1] == pytest.approx(expected, abs=1e-7 * site.earth_rate_rad_s)
+    forces = reference_vectors("accelerometer", ANGLES, site)
+    of_gravity = table_errors(ANGLES, forces, declared, of_gravity=True)
+    assert not of_gravity.sensitivity[:, :, -1].any()
+    assert of_gravity.sd[-1] == 0.0
+    assert "latitude" not in table_errors(ANGLES, vectors, TableUncertainty(), of_gravity=False).source
 
 
 def test_heading_does_not_move_gravity():

@@ -136,6 +136,13 @@ def test_a_calibration_of_thermometers_is_used(recordings):
     params = Params(own_sensors=OWN, channels=("gyro_x",), soaks=False)
     found = temperature_dependence.analyse(Evidence(tuple(recordings[:1])), params, unit)
     assert found.thermometers == "t-1"
+    assert temperature_dependence.METHOD.uses_corrections(found) == ("thermometers",)
+    others = replace(known, sensors=known.sensors[1:], covariance=tuple(row[2:] for row in known.covariance[2:]))
+    without = temperature_dependence.analyse(
+        Evidence(tuple(recordings[:1])), params, replace(unit, thermometers=others)
+    )
+    assert without.thermometers == ""
+    assert temperature_dependence.METHOD.uses_corrections(without) == ()
     assert found.range_c[1] == pytest.approx(35.0 - 3.0 - 0.1 * 15.0, abs=1.0)
 
 

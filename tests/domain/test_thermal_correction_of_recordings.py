@@ -9,10 +9,12 @@ from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.limits import Verdict
 from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Quantity
 from procedures.core.thermal_correction import Form
+from procedures.core.unit import Unit
 from procedures.methods import discover, thermal_correction_of_recordings
 from procedures.methods.thermal_correction_of_recordings import Params, Result
 from procedures.procedure import Evidence
 from simulators.truth.thermal import UnitThermalTruth
+from tests.correction_samples import thermometers
 from tests.domain.thermal_samples import recordings, unit_of
 from tests.kit.procedures import require_report
 from tests.validation.thermal_rig import LAG_S, THESIS_LIKE, G, reference_c, true_coefficients
@@ -87,6 +89,33 @@ def test_one_sensor_gives_the_single_form(imported: list[MemoryRecording]) -> No
         assert fit.dynamic_sd_m_s2 is not None
         assert fit.static_sd_m_s2 < fit.dynamic_sd_m_s2
     assert any("ideal, level" in w for w in found.warnings)
+
+
+def test_the_lineage_names_what_was_applied(imported: list[MemoryRecording], result: Result) -> None:
+    """Thermometers that lack a sensor, and a converter where one sensor explains all, are dropped and not named."""
+    assert METHOD.uses_corrections(result) == ("converter",)
+    known = thermometers(1).thermometers
+    assert known is not None
+    both = [replace(sensor, channel=name) for sensor, name in zip(known.sensors, ("T1", "T2"), strict=False)]
+    covariance = tuple(row[:4] for row in known.covariance[:4])
+    unit = replace(unit_of(TRUTH, 5), thermometers=replace(known, sensors=tuple(both), covariance=covariance))
+
+    def used(unit: Unit, **changes: object) -> tuple[str, ...]:
+        found = thermal_correction_of_recordings.analyse(Evidence(tuple(imported)), parameters(**changes), unit)
+        return METHOD.uses_corrections(found)
+
+    assert used(unit) == ("thermometers", "converter")
+    assert used(replace(unit, thermometers=known)) == ("converter",), "no sensor of these is calibrated"
+    assert used(unit, converter_sensor=None) == ("thermometers",)
+    assert used(unit, converter=False, thermometers=False) == ()
+
+
+def test_a_calibration_in_counts_is_said_to_be_left_out(imported: list[MemoryRecording], result: Result) -> None:
+    assert not any("ideal, level" in w for w in result.warnings)
+    unit = unit_of(TRUTH, 5)
+    counted = replace(unit, calibrations=tuple(replace(c, output_unit="count") for c in unit.calibrations))
+    found = thermal_correction_of_recordings.analyse(Evidence(tuple(imported)), parameters(), counted)
+    assert any("no calibration of its accelerometers in m/s²" in w for w in found.warnings)
 
 
 def test_each_recording_is_read_once(imported: list[MemoryRecording]) -> None:

@@ -60,6 +60,9 @@ def test_a_sensor_that_remembers_where_it_came_from_fails_and_is_named():
     (path,) = [c for c in result.checks if c.name.startswith("up against down")]
     assert not path.passed
     assert "temperature_gyro_x" in path.note
+    planned = {p.check: p.limit for p in thermometer_calibration.planned_checks(params, CONTEXT)}
+    judged = {c.name: c.limit for c in result.checks if c.name in planned}
+    assert {name: limit.minimum for name, limit in planned.items()} == {n: lim.minimum for n, lim in judged.items()}
 
 
 def test_the_chambers_accuracy_comes_from_the_bench_and_is_asked_for_without_it():

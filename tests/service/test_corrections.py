@@ -3,7 +3,8 @@
 import pytest
 
 from bench_service.persistence import open_stores
-from tests.correction_samples import converter, thermal
+from procedures.core.limits import Verdict
+from tests.correction_samples import converter, gyros, thermal
 from tests.service.client import Client
 from tests.service.page import page
 
@@ -57,6 +58,22 @@ def test_another_one_is_chosen_and_new_jobs_know_it(client: Client, made: list[d
     other = client.http.post(f"{UNIT}/corrections/{new['id']}/current", headers=key)
     assert other.status_code == 409
     assert client.http.get(UNIT).json()["thermal_correction"] == new["id"]
+
+
+def test_one_of_a_failed_result_is_chosen_with_a_remark(client: Client, database_url: str, made: list[dict]) -> None:
+    stores, database = open_stores(database_url)
+    try:
+        one = stores.results.get(made[0]["result"])
+        failed = type(one)(**{**vars(one), "id": f"{one.id}-failed", "verdict": Verdict.FAIL})
+        stores.results.add(failed, by_rule=False, corrections=[gyros(3)])
+    finally:
+        database.dispose()
+    (stored,) = client.http.get(f"{UNIT}/corrections", params={"kind": "gyros"}).json()["items"]
+    refused = client.http.post(f"{UNIT}/corrections/{stored['id']}/current")
+    assert (refused.status_code, refused.headers["content-type"]) == (409, "application/problem+json")
+    assert "give a remark" in refused.json()["detail"]
+    body = {"by": "Ann", "remark": "the limit was for another model"}
+    assert client.http.post(f"{UNIT}/corrections/{stored['id']}/current", json=body).json()["current"]
 
 
 def test_what_does_not_exist_is_a_problem_that_says_so(client: Client, made: list[dict]) -> None:

@@ -57,6 +57,7 @@ def test_recordings_with_temperatures_are_fitted_by_a_method(sqlite_client: Clie
     found = answer.json()["document"] if "document" in answer.json() else answer.json()["result"]
     assert found["channels"][0]["sensor"] == "temperature_case"
     assert found["thermometers"] == sqlite_client.http.get(UNIT).json()["thermometers"]
+    assert answer.json()["lineage"]["corrections"] == [found["thermometers"]]
     body["parameters"] = {"channels": ["accelerometer_x"]}
     refused = sqlite_client.http.post("/api/v1/analyses", json=body)
     assert refused.status_code == 422

@@ -10,9 +10,10 @@ import pytest
 from bench_service import wall_clock
 from bench_service.campaigns.stores import Stores
 from bench_service.model.calibrations import Act, Approval, Decider
-from bench_service.model.errors import IdempotencyConflict, NotFound
+from bench_service.model.errors import CorrectionRefused, IdempotencyConflict, NotFound
 from bench_service.model.records import Idempotency, StoredResult
 from procedures.core.errors import BadParameter
+from procedures.core.limits import Verdict
 from procedures.core.thermal_correction import Form
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import UnitCorrection
@@ -52,6 +53,21 @@ def test_of_each_kind_one_is_current(stores: Stores, new_result: NewResult) -> N
     assert [repr(c.correction) for c in (*page.items, *rest.items)] == [repr(thermal(s)) for s in (5, 2, 1)]
     assert rest.next is None
     assert stores.corrections.current("U-1", "converter") in shown
+
+
+@pytest.mark.parametrize("verdict", [Verdict.FAIL, Verdict.ERROR])
+def test_one_of_a_result_that_did_not_pass_is_chosen_with_a_remark(
+    stores: Stores, new_result: NewResult, verdict: Verdict
+) -> None:
+    stores.results.add(new_result(), corrections=[thermal(1)])
+    stores.results.add(new_result(verdict=verdict), by_rule=False, corrections=[thermal(2)])
+    failed, good = stores.corrections.list("U-1", kind="thermal").items
+    key = Idempotency("k", "f")
+    with pytest.raises(CorrectionRefused, match=rf"{failed.id}.*verdict is {verdict}.*remark"):
+        stores.corrections.make_current("U-1", failed.id, Decider("Bo"), key)
+    assert stores.corrections.current("U-1", "thermal") == good
+    assert stores.corrections.make_current("U-1", failed.id, ANN, key).current
+    assert stores.corrections.make_current("U-1", good.id, Decider("Bo")).current
 
 
 def test_a_person_chooses_which_one_is_current(stores: Stores, new_result: NewResult) -> None:

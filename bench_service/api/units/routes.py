@@ -86,7 +86,10 @@ def choose_correction(
     body: CorrectionChoice | None = None,
     key: IdempotencyKey = None,
 ) -> CorrectionView:
-    """Make a correction set the one that new jobs use; jobs that began before keep theirs. A body is not needed."""
+    """Make a correction set the one that new jobs use; jobs that began before keep theirs.
+
+    A body is needed, with a remark, for a correction of a result that did not pass.
+    """
     by = decider(None, "") if body is None else decider(body.by, body.remark)
     asked = Idempotency.of("corrections", key, [serial, correction_id, *([] if body is None else [body])])
     return CorrectionView.of(service.stores.corrections.make_current(serial, correction_id, by, asked))

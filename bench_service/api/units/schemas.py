@@ -101,7 +101,7 @@ class CorrectionChoice(Request):
     """Request to make a correction set the one that counts."""
 
     by: Annotated[str, NAME] | None = Field(None, description="Person who decides; null: the client's name")
-    remark: Remark = ""
+    remark: Remark = Field("", description="Needed for a correction of a result that did not pass")
 
 
 class CorrectionPage(BaseModel):

@@ -48,7 +48,7 @@ def choose(
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Make a correction the one of its kind that new jobs use; jobs that began before keep theirs."""
+    """Make a correction the one of its kind that new jobs use; one of a result that failed needs a remark."""
     body = {"by": by, "remark": remark}
     _post(context, f"{_path(unit)}/{segment(correction_id)}/current", body, server, as_json)
 

@@ -54,6 +54,7 @@ class SiteSection(Section):
     gravity_sd_m_s2: Annotated[float, Field(ge=0.0, le=0.01)] = 0.0
     azimuth_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
     azimuth_sd_arcsec: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.0
+    latitude_sd_arcsec: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.0
     certificate: Certificate | None = None
 
 

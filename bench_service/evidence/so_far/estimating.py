@@ -99,6 +99,7 @@ class Estimating:
             **{name: float(declared.get(name) or 0.0) for name in _TABLE},
             azimuth_sd_arcsec=site.azimuth_sd_arcsec,
             gravity_relative_sd=site.gravity_sd_m_s2 / site.gravity_m_s2,
+            latitude_sd_arcsec=float(job.parameters.get("latitude_sd_arcsec") or site.latitude_sd_arcsec),
         )
         for triad in TRIAD_NAMES:
             try:

@@ -9,13 +9,19 @@ from sqlalchemy.orm import Session
 from bench_service import wall_clock
 from bench_service.evidence.corrections import StoredCorrection
 from bench_service.model.calibrations import Act, Decider
-from bench_service.model.errors import NotFound
+from bench_service.model.errors import CorrectionRefused, NotFound
 from bench_service.model.records import Idempotency, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.evidence.correction_rows import corrections_where, retire_current
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
-from bench_service.persistence.tables.evidence import CorrectionDecisionRow, CorrectionRow, ResultCorrectionRow
+from bench_service.persistence.tables.evidence import (
+    CorrectionDecisionRow,
+    CorrectionRow,
+    ResultCorrectionRow,
+    ResultRow,
+)
+from procedures.core.limits import Verdict
 from procedures.core.unit_correction import CorrectionKind
 
 
@@ -63,6 +69,7 @@ class SqlCorrectionStore:
                 row = _found(session, unit, correction_id)
                 if made_before(session, idempotency, "correction choice") is None:
                     at = wall_clock.now()
+                    _require_remark(session, row, by)
                     remember(session, idempotency, "correction choice", correction_id, at)
                     _lock_all(session, unit, row.kind)
                     retire_current(session, unit, row.kind)
@@ -114,6 +121,16 @@ class SqlCorrectionStore:
                 return _one(session, unit, correction_id)
 
         return again_after_conflict(once)
+
+
+def _require_remark(session: Session, row: CorrectionRow, by: Decider) -> None:
+    """Refuse to choose a correction of a result that did not pass without a reason. Raises `CorrectionRefused`."""
+    verdict = session.scalars(select(ResultRow.verdict).where(ResultRow.id == row.result_id)).one()
+    if verdict != Verdict.PASS.value and not by.remark:
+        raise CorrectionRefused(
+            f"correction {row.id} of the kind {row.kind!r} comes from result {row.result_id}, whose verdict is "
+            f"{verdict}: give a remark that says why it is used nevertheless"
+        )
 
 
 def _decision(correction_id: str, by: Decider, act: Act, at: datetime) -> CorrectionDecisionRow:

@@ -32,7 +32,7 @@ PROCESSES = {
 }
 """Noise process -> its name in a budget, and what follows the rate's unit in its own."""
 OBSERVED = "noise, from the scatter of the recordings"
-TABLE = ("orthogonality", "level", "azimuth", "gravity", "pointing", "direction", "mounting")
+TABLE = ("orthogonality", "level", "azimuth", "gravity", "pointing", "direction", "mounting", "latitude")
 
 
 @dataclass(frozen=True)

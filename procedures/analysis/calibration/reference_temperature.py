@@ -64,6 +64,11 @@ def require_correctable(thermal_correction: str, dwell_s: float | None, unit: Un
         raise BadParameter("dwell_s", dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read at the same time")
 
 
+def least_dwell_s(thermal_correction: str) -> float:
+    """Duration before which no stop rule may end a dwell [s]: that of the temperatures' line, where they are used."""
+    return LEAST_DWELL_S if thermal_correction == "current" else 0.0
+
+
 @dataclass(frozen=True)
 class StationTemperatures:
     """Sensors at the middle of each dwell, lag taken out, each (n, m) [°C]: those of Δt, then the converter's."""

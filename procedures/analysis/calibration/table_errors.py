@@ -16,7 +16,7 @@ from procedures.core.arrays import Array
 from procedures.core.frames import table_rotation
 from procedures.core.table_angles import TableAngles
 
-SOURCES = ("orthogonality", "level", "azimuth", "gravity", "pointing", "direction")
+SOURCES = ("orthogonality", "level", "azimuth", "gravity", "pointing", "direction", "latitude")
 X, Y, Z = np.eye(3)
 
 
@@ -36,6 +36,8 @@ class TableUncertainty:
     """Relative uncertainty of the reference magnitude; concerns the accelerometers alone."""
     mounting_sd_arcsec: float = 0.0
     """Repeatability of the unit's seat about each of its axes: no station of one mounting shows it."""
+    latitude_sd_arcsec: float = 0.0
+    """Latitude of the site, constant; concerns the gyros alone."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,8 @@ def table_errors(
 
     Columns: orthogonality outer-middle (about x between the two) and middle-inner (about y), level about x and z of the
     reference frame, azimuth about y, the magnitude of gravity, then pointing outer, middle, inner of station after
-    station. The order depends on the number of stations alone, so columns of two triads at the same stations mean the
-    same flaw.
+    station, and the latitude last where its uncertainty is declared. The order does not depend on the triad, so columns
+    of two triads at the same stations mean the same flaw.
     """
     n = len(angles)
     sensitivity = np.zeros((n, 3, 6 + 3 * n))
@@ -79,7 +81,28 @@ def table_errors(
     sd = np.array([*np.array(angular) * units.ARCSEC, u.gravity_relative_sd])
     pointing = np.full(3 * n, u.pointing_sd_arcsec * units.ARCSEC)
     source = ("orthogonality",) * 2 + ("level",) * 2 + ("azimuth", "gravity") + ("pointing",) * (3 * n)
-    return TableErrors(sensitivity, np.concatenate([sd, pointing]), source, u.mounting_sd_arcsec * units.ARCSEC)
+    seat_sd_rad = u.mounting_sd_arcsec * units.ARCSEC
+    sd = np.concatenate([sd, pointing])
+    if u.latitude_sd_arcsec <= 0.0:
+        return TableErrors(sensitivity, sd, source, seat_sd_rad)
+    by_latitude = np.zeros((n, 3)) if of_gravity else per_latitude(angles, vectors)
+    sensitivity = np.concatenate([sensitivity, by_latitude[:, :, None]], axis=2)
+    sd = np.append(sd, 0.0 if of_gravity else u.latitude_sd_arcsec * units.ARCSEC)
+    return TableErrors(sensitivity, sd, (*source, "latitude"), seat_sd_rad)
+
+
+def per_latitude(angles: Sequence[TableAngles], rates: Array) -> Array:
+    """Change of the Earth's rate (n, 3) in the unit's axes per radian of latitude, (n, 3).
+
+    ``Ω = Ω·(cos φ·N + sin φ·U)`` gives ``∂Ω/∂φ = Ω·(−sin φ·N + cos φ·U) = E × Ω``, E the east, ``Ω × U = Ω·cos φ·E``: a
+    turn in the meridian's plane, which gyros at rest cannot tell from a level about the east. Zero at a pole, where
+    there is no east and no azimuth.
+    """
+    up = np.array([table_rotation(station).inv().apply(Y) for station in angles])
+    east = np.cross(rates, up)
+    length = np.linalg.norm(east, axis=1)[:, None]
+    defined = length > 1e-9 * np.linalg.norm(rates, axis=1)[:, None]
+    return np.where(defined, np.cross(east / np.where(defined, length, 1.0), rates), 0.0)
 
 
 def direction_errors(vectors: Array, sd_rad: float, magnitude_relative_sd: float) -> TableErrors:

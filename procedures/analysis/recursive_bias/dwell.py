@@ -42,7 +42,7 @@ def expected_s(rule: StopRule, longest_s: float) -> float:
     """Duration of a dwell of declared noise under a rule [s]; the longest where a target is out of reach."""
     every, count = checks_of(rule, longest_s)
     for k in range(1, count + 1):
-        if all(mean_sd(t.noise, k * every) <= t.target_sd for t in rule.targets):
+        if k * every >= rule.least_s - 1e-9 and all(mean_sd(t.noise, k * every) <= t.target_sd for t in rule.targets):
             return k * every
     return longest_s
 
@@ -87,7 +87,9 @@ class LiveDwell:
         return None
 
     def _is_enough(self) -> bool:
-        return self._reachable and self._estimates[0].count >= self._enough and self.p_value >= self._rule.level
+        count = self._estimates[0].count
+        long_enough = count >= self._enough and count * self._every >= self._rule.least_s - 1e-9
+        return self._reachable and long_enough and self.p_value >= self._rule.level
 
     @property
     def p_value(self) -> float:

@@ -232,15 +232,21 @@ def calibrate(soaked: Soaked, settings: SoakSettings) -> Calibrated:
     return Calibrated(sensors, correction, _hysteresis(soaked, sensors), tuple(rest.tolist()))
 
 
+def both_ways(targets_c: Sequence[float]) -> list[tuple[float, list[int], list[int]]]:
+    """Targets that a sequence of soaks reaches from below and from above, with the indices of both kinds of soaks."""
+    ways = [np.sign(b - a) for a, b in pairwise(targets_c)]
+    found: list[tuple[float, list[int], list[int]]] = []
+    for target in sorted(set(targets_c)):
+        up, down = ([k + 1 for k, w in enumerate(ways) if w == way and targets_c[k + 1] == target] for way in (1, -1))
+        if up and down:
+            found.append((target, up, down))
+    return found
+
+
 def _hysteresis(soaked: Soaked, sensors: Sequence[SensorFit]) -> tuple[UpAgainstDown, ...]:
     """Errors on the way up against those on the way down, at every target that was reached both ways."""
-    targets = soaked.target_c.tolist()
-    ways = [np.sign(b - a) for a, b in pairwise(targets)]
     found: list[UpAgainstDown] = []
-    for target in sorted(set(targets)):
-        up, down = ([k + 1 for k, w in enumerate(ways) if w == way and targets[k + 1] == target] for way in (1, -1))
-        if not up or not down:
-            continue
+    for target, up, down in both_ways(soaked.target_c.tolist()):
         for sensor in sensors:
             error, sd = np.array(sensor.error_c), np.array(sensor.error_sd_c)
             gap = float(error[up].mean() - error[down].mean())

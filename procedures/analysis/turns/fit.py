@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import block_diag
 
-from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, per_latitude, table_errors
 from procedures.analysis.least_squares.chi_square import judged_p_value
 from procedures.analysis.least_squares.determination import require_full_rank
 from procedures.analysis.least_squares.inverse import scaled_pinv
@@ -137,8 +137,9 @@ def turn_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableErrors:
     Columns as `table_errors` has them. The axis' direction in the unit and the angles at the ends change the turned
     angle; the outer axis' pointing counts twice, at the beginning and at the end, independently: √2 along the axis.
     Level and azimuth move axis and unit together and change the Earth's turn E alone: a heading ψ turns its part across
-    the axis, ``δE = δψ·(E × e)``, and a tilt about a horizontal h its part along it, ``δE = δε·T·e·(e·(Ω × h))``. What
-    the tilt changes across the axis is left out: it comes and goes with every turn.
+    the axis, ``δE = δψ·(E × e)``, and a tilt about a horizontal h its part along it, ``δE = δε·T·e·(e·(Ω × h))``; a
+    latitude φ likewise, ``δE = δφ·T·e·(e·∂Ω/∂φ)``. What tilt and latitude change across the axis is left out: it comes
+    and goes with every turn.
     """
     u = replace(uncertainty, gravity_relative_sd=0.0, mounting_sd_arcsec=0.0)
     flaws = table_errors(motion.angles, motion.turned_b, u, of_gravity=False)
@@ -149,6 +150,9 @@ def turn_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableErrors:
             along = float(axis @ np.cross(motion.earth_rate_b[i], level))
             flaws.sensitivity[i, :, column] = motion.seconds[i] * along * axis
         flaws.sensitivity[i, :, 4] = np.cross(motion.earth_rad[i], axis)
+    if uncertainty.latitude_sd_arcsec > 0.0:
+        along = np.sum(motion.axis_b * per_latitude(motion.angles, motion.earth_rate_b), axis=1)
+        flaws.sensitivity[:, :, -1] = (motion.seconds * along)[:, None] * motion.axis_b
     return flaws
 
 
