@@ -47,7 +47,7 @@ _SIZES: dict[Quantity, dict[str, _Size]] = {
     Quantity.ANGULAR_RATE: {name: _Size(size) for name, size in _RATE.items()},
     Quantity.SPECIFIC_FORCE: {name: _Size(size) for name, size in _FORCE.items()},
     Quantity.TEMPERATURE: _TEMPERATURE,
-    Quantity.ANGLE: {name: _Size(size) for name, size in _ANGLE.items()},
+    Quantity.TABLE_ANGLE: {name: _Size(size) for name, size in _ANGLE.items()},
     Quantity.TIME: {"s": _Size(1.0), "ms": _Size(1e-3), "us": _Size(1e-6)},
 }
 _SPELLINGS = {

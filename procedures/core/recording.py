@@ -39,7 +39,7 @@ class Quantity(StrEnum):
     ANGULAR_RATE = "angular_rate"
     SPECIFIC_FORCE = "specific_force"
     TEMPERATURE = "temperature"
-    ANGLE = "angle"
+    TABLE_ANGLE = "table_angle"
     TIME = "time"
 
 
@@ -50,11 +50,11 @@ UNITS: dict[Quantity, tuple[str, ...]] = {
     Quantity.ANGULAR_RATE: ("rad/s", "count"),
     Quantity.SPECIFIC_FORCE: ("m/s^2", "count"),
     Quantity.TEMPERATURE: ("degC", "count"),
-    Quantity.ANGLE: ("rad", "count"),
+    Quantity.TABLE_ANGLE: ("rad", "count"),
     Quantity.TIME: ("s", "count"),
 }
 """Permitted units of a channel of each quantity; "count" marks a scale that is not known yet."""
-AROUND = (Quantity.TEMPERATURE, Quantity.ANGLE, Quantity.TIME)
+AROUND = (Quantity.TEMPERATURE, Quantity.TABLE_ANGLE, Quantity.TIME)
 """Quantities around the unit or beside its triads: no inertial channel has one."""
 
 

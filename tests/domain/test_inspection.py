@@ -80,6 +80,7 @@ def test_everything_that_takes_recordings_says_how_they_are_inspected() -> None:
         "noise_analysis",
         "scalar_calibration",
         "temperature_dependence",
+        "thermal_correction_of_recordings",
     }
 
 

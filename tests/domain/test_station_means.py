@@ -60,7 +60,7 @@ def test_a_dead_channel_is_refused(value: int, stations: int):
     raws = [counts(i) for i in range(stations)]
     for raw in raws:
         raw[:, 2] = value
-    with pytest.raises(UnfitRecording, match=r"gyro_z reads .* dead"):
+    with pytest.raises(UnfitRecording, match=r"gyro_z reads .* stuck"):
         station_means([recording(raw) for raw in raws], "gyro")
 
 

@@ -16,7 +16,7 @@ from tests.service.client import Client
 def test_places_are_bounded_by_number_and_memory_and_given_back_once() -> None:
     places = Places("exports", most=2, most_bytes=100)
     first = places.take(90)
-    with pytest.raises(Overloaded, match="1 exports are under way already"):
+    with pytest.raises(Overloaded, match="1 exports are running already"):
         places.take(20)
     second = places.take(10)
     with pytest.raises(Overloaded):

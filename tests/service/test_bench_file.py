@@ -190,7 +190,7 @@ def test_a_unit_is_declared_by_its_file(tmp_path: Path) -> None:
     [
         ('unit = "m/s"', 'unit = "m/s^2"', ("line 14", "channels.1", "unit 'm/s^2' is none of")),
         ("scale = 2.4e-5", "scale = 0", ("channels.1", "not zero")),
-        ('name = "accelerometer_x"', 'name = "gyro_x"', ("'gyro_x' is there twice",)),
+        ('name = "accelerometer_x"', 'name = "gyro_x"', ("'gyro_x' is listed twice",)),
         ('state = "as found"', 'state = "as sold"', ("line 23", "coefficients.0.state")),
         ('serial = "GL017"', 'serial = "GL018"', ("its file is GL018.toml",)),
         ("sample_rate_hz = 400", "sample_rate_hz = -1", ("line 6", "sample_rate_hz = -1")),

@@ -85,7 +85,7 @@ def test_a_service_that_stays_away_is_given_up_with_the_way_back_and_no_old_repo
     assert not list(tmp_path.iterdir())
     key = keyless.split("--key ")[1].split()[0]
     assert len(key) == 36, "a command without a key of the user's has one of its own"
-    assert "The service has job j1 and goes on with it" in job
+    assert "The service has job j1 and continues it" in job
     assert f"{address}/jobs/j1" in job
 
 

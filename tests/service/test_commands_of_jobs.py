@@ -274,7 +274,7 @@ def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_pat
         assert checked.code == 0, checked.err
         assert "valid, unchanged, signed by CN=Lab" in checked.out
         assert "entered from passport 17: there are no raw data" in checked.out
-    one_line(bench("certificate", "check", laboratory, "--certificate", tmp_path / "lab.cert.pem"), "no XML")
+    one_line(bench("certificate", "check", laboratory, "--certificate", tmp_path / "lab.cert.pem"), "not XML")
     (tmp_path / "no.pdf").write_bytes(b"%PDF-1.7\n")
     one_line(bench("certificate", "check", tmp_path / "no.pdf", "--certificate", tmp_path / "lab.cert.pem"), "PDF")
     assert bench("calibration", "reject", "SIM-0001", known, "--remark", "wrong unit").code == 0

@@ -195,7 +195,7 @@ def test_verbs_become_states_and_a_refused_demand_changes_nothing(tmp_path: Path
     assert state() == (AT_REST, False)
     bench.close()
     bench.close()
-    with pytest.raises(Disconnected, match="given up"):
+    with pytest.raises(Disconnected, match="has closed its link"):
         asyncio.run(bench.supply.switch_on())
     assert state() == (AT_REST, False)
 
@@ -247,7 +247,7 @@ def test_a_full_disk_costs_lines_of_the_journal_and_no_state(small_disk: Path) -
 @pytest.mark.parametrize(
     ("text", "named"),
     [
-        ("hang", "no JSON"),
+        ("hang", "not JSON"),
         ('{"rules": [{"verb": "*", "kind": "hang", "probability": 1.5}]}', "rules.0.probability = 1.5"),
         ('{"rules": [{"verb": "*", "kind": "melt", "probability": 0.5}]}', "rules.0.kind = 'melt'"),
         ('{"rules": [{"verb": "*", "kind": "hang", "probability": 0.5, "lasts_s": 2}]}', "lasts_s applies to a lost"),

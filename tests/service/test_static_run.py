@@ -114,7 +114,7 @@ def test_the_page_shows_tables_and_plots(client: Client, result: dict[str, Any])
         assert title in page
     assert drawn(client, page) >= 2 * 6
     unit = client.http.get("/units/SIM-0001").text
-    assert f"result {result['id']}" in unit
+    assert f"/results/{result['id']}" in unit
 
 
 def test_steps_can_be_switched_off_on_the_same_recordings(client: Client, job: dict[str, Any]) -> None:

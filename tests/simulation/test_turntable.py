@@ -77,7 +77,7 @@ def test_a_table_that_does_not_come_to_rest_says_so(quiet_config, monkeypatch) -
     with pytest.raises(NotSettled, match="within 10 s"):
         asyncio.run(bench.turntable.move_to(TableAngles(5, 0, 0)))
     monkeypatch.undo()
-    with pytest.raises(DeviceFault, match="one demand at a time"):
+    with pytest.raises(DeviceFault, match="wait for the end of its motion"):
         asyncio.run(bench.turntable.move_to(TableAngles(0, 0, 0)))
     asyncio.run(bench.turntable.make_safe())
     assert bench.turntable.locked

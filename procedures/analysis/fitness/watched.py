@@ -36,7 +36,7 @@ class Inspection:
 
     def matters(self, found: ChannelFitness, channel: Channel) -> ChannelFitness | None:
         """The findings of a channel as far as they matter to the analysis."""
-        if channel.quantity in (Quantity.ANGLE, Quantity.TIME):
+        if channel.quantity in (Quantity.TABLE_ANGLE, Quantity.TIME):
             return None
         if channel.quantity is not Quantity.TEMPERATURE:
             return found if self.channels is None or channel.name in self.channels else None

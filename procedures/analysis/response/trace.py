@@ -20,7 +20,7 @@ TIME_STEP_S = 1e-7
 ANGLES = ("table_outer", "table_middle", "table_inner")
 AGE, WITHIN = "table_reading_age", "table_reading_within"
 ENCODER_CHANNELS = (
-    *(Channel(name, Quantity.ANGLE, "rad", ANGLE_STEP_DEG * units.DEG) for name in ANGLES),
+    *(Channel(name, Quantity.TABLE_ANGLE, "rad", ANGLE_STEP_DEG * units.DEG) for name in ANGLES),
     Channel(AGE, Quantity.TIME, "s", TIME_STEP_S),
     Channel(WITHIN, Quantity.TIME, "s", TIME_STEP_S),
 )
