@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import BigInteger, Float, ForeignKey, Index, LargeBinary, TextClause, text
+from sqlalchemy import BigInteger, Float, ForeignKey, Index, LargeBinary, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from bench_service.persistence.tables.columns import Document, Id, Table
@@ -15,16 +15,12 @@ OF_A_TREND = ("unit", "name", "simulated", "id", "job_id", "created_at", "code_v
 """Columns of results that a trend is found by, and what it shows of them: behind the document they are slow to read."""
 
 
-def _where(condition: TextClause) -> dict[str, TextClause]:
-    """Arguments of an index that has only the rows of a condition."""
-    return {"sqlite_where": condition, "postgresql_where": condition}
-
-
 def _short_and_long(column: str) -> tuple[Index, Index]:
     """Indexes of a text without a bound: one has the short texts themselves, the other only the rows of long ones."""
+    short, long = (text(f"length({column}) {bound} {KEY_LENGTH}") for bound in ("<=", ">"))
     return (
-        Index(f"ix_recordings_{column}_id", column, "id", **_where(text(f"length({column}) <= {KEY_LENGTH}"))),
-        Index(f"ix_recordings_long_{column}", "id", **_where(text(f"length({column}) > {KEY_LENGTH}"))),
+        Index(f"ix_recordings_{column}_id", column, "id", sqlite_where=short, postgresql_where=short),
+        Index(f"ix_recordings_long_{column}", "id", sqlite_where=long, postgresql_where=long),
     )
 
 
