@@ -175,13 +175,13 @@ def test_dwells_with_temperatures_are_at_least_as_long_as_their_line(procedure):
     warm = replace(CONTEXT, unit=replace(CONTEXT.unit, thermal_correction=thermal(1).thermal))
     asked = {"dwell_s": 60.0, "stop_at": {"accelerometer_m_s2": 0.1, "check_s": 0.5}}
     plain = procedure.resolve(procedure.Params.model_validate(asked), warm)
-    assert plain.stop_at.expected_s(60.0) == 0.5
+    assert expected_s(plain.stop_at.rule, 60.0) == 0.5
     params = procedure.resolve(procedure.Params.model_validate({**asked, "thermal_correction": "current"}), warm)
     assert {s.until.least_s for s in procedure.schedule(params)} == {LEAST_DWELL_S}
-    assert params.stop_at.expected_s(60.0) == LEAST_DWELL_S
+    assert expected_s(params.stop_at.rule, 60.0) == LEAST_DWELL_S
     again = {**asked["stop_at"], "rule": plain.stop_at.rule}
     given = procedure.Params.model_validate({**asked, "stop_at": again, "thermal_correction": "current"})
-    assert procedure.resolve(given, warm).stop_at.expected_s(60.0) == LEAST_DWELL_S
+    assert expected_s(procedure.resolve(given, warm).stop_at.rule, 60.0) == LEAST_DWELL_S
 
 
 def test_without_a_rule_nothing_changes():
