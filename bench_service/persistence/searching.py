@@ -14,7 +14,8 @@ from sqlalchemy.sql.functions import FunctionElement
 
 from bench_service.model.job import job_number
 from bench_service.model.search import LabelSought, Search
-from bench_service.persistence.tables.evidence import KEY_LENGTH, NAMES_JOIN, RecordingRow, ResultRow
+from bench_service.persistence.tables.columns import KEY_LENGTH
+from bench_service.persistence.tables.evidence import NAMES_JOIN, RecordingRow, ResultRow
 from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
 
 S = TypeVar("S", bound=Select[*tuple[Any, ...]])

@@ -70,7 +70,7 @@ def test_a_copy_made_under_load_has_everything_acknowledged_and_its_running_job_
 ) -> None:
     url: str = request.getfixturevalue(f"{kind}_url")
     devices, copy = tmp_path / "devices", tmp_path / "copies" / "copy"
-    settings = Settings(database_url=url, device_folder=devices, real_time_factor=20.0)
+    settings = Settings(database_url=url, device_folder=devices, real_time_factor=12.0)
     with connect(settings, None, drive=True) as http:
         client = Client(http)
         long_job = client.submit(parameters=FAST, seed=7)["id"]

@@ -265,6 +265,7 @@ def test_it_ends_by_itself_in_mid_motion_while_the_service_is_busy(client: Clien
 
 def test_its_end_is_in_the_audit_trail(client: Client) -> None:
     hand = Hand(client)
+    _until(lambda: hand.read()["began_at"])
     hand.end()
     entries = _until(
         lambda: [

@@ -13,7 +13,7 @@ from bench_service.model.job import Job
 from bench_service.model.records import NewRecording, StoredResult
 from bench_service.model.search import LabelSought, Search
 from bench_service.persistence import text_search
-from bench_service.persistence.tables.evidence import KEY_LENGTH
+from bench_service.persistence.tables.columns import KEY_LENGTH
 from bench_service.wall_clock import new_id
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray, Station

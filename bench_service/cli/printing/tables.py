@@ -128,7 +128,7 @@ def job_table(jobs: list[dict[str, Any]]) -> Table:
             job["state"],
             job["verdict"] or "–",
             f"{done['station']}/{done['stations']}",
-            job["created_at"][:19].replace("T", " "),
+            job["created_at"][:16].replace("T", " "),
         )
     return table
 

@@ -11,13 +11,18 @@ from sqlalchemy import (
     JSON,
     DateTime,
     Dialect,
+    Index,
     MetaData,
     String,
+    text,
 )
 from sqlalchemy.orm import DeclarativeBase, InstrumentedAttribute
 from sqlalchemy.types import TypeDecorator
 
 from bench_service.mapping import field_names
+
+KEY_LENGTH = 500
+"""Most characters of a text that is the key of an index: Postgres takes 2704 bytes, and a character has up to four."""
 
 
 class UtcDateTime(TypeDecorator[datetime]):
@@ -65,3 +70,12 @@ class Table(DeclarativeBase):
 def columns(table: type[Table], shape: type) -> tuple[InstrumentedAttribute[Any], ...]:
     """Columns of a table that match a data class, in the order of its fields."""
     return tuple(getattr(table, name) for name in field_names(shape))
+
+
+def short_and_long(table: str, column: str) -> tuple[Index, Index]:
+    """Indexes of a text without a bound: one has the short texts themselves, the other only the rows of long ones."""
+    short, long = (text(f"length({column}) {bound} {KEY_LENGTH}") for bound in ("<=", ">"))
+    return (
+        Index(f"ix_{table}_{column}_id", column, "id", sqlite_where=short, postgresql_where=short),
+        Index(f"ix_{table}_long_{column}", "id", sqlite_where=long, postgresql_where=long),
+    )

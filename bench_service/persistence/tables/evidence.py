@@ -6,22 +6,11 @@ from typing import Any
 from sqlalchemy import BigInteger, Float, ForeignKey, Index, LargeBinary, text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from bench_service.persistence.tables.columns import Document, Id, Table
+from bench_service.persistence.tables.columns import Document, Id, Table, short_and_long
 
 NAMES_JOIN = "\n"
-KEY_LENGTH = 500
-"""Most characters of a text that is the key of an index: Postgres takes 2704 bytes, and a character has up to four."""
 OF_A_TREND = ("unit", "name", "simulated", "id", "job_id", "created_at", "code_version")
 """Columns of results that a trend is found by, and what it shows of them: behind the document they are slow to read."""
-
-
-def _short_and_long(column: str) -> tuple[Index, Index]:
-    """Indexes of a text without a bound: one has the short texts themselves, the other only the rows of long ones."""
-    short, long = (text(f"length({column}) {bound} {KEY_LENGTH}") for bound in ("<=", ">"))
-    return (
-        Index(f"ix_recordings_{column}_id", column, "id", sqlite_where=short, postgresql_where=short),
-        Index(f"ix_recordings_long_{column}", "id", sqlite_where=long, postgresql_where=long),
-    )
 
 
 class UnitRow(Table):
@@ -54,8 +43,8 @@ class RecordingRow(Table):
         Index("ix_recordings_state_stored_bytes", "state", "stored_bytes"),
         Index("ix_recordings_simulated_id", "simulated", "id"),
         Index("ix_recordings_bench_id", "bench", "id"),
-        *_short_and_long("station_label"),
-        *_short_and_long("file_names"),
+        *short_and_long("recordings", "station_label"),
+        *short_and_long("recordings", "file_names"),
         Index("ix_recordings_raw_state_stored_bytes", "raw", "state", "stored_bytes"),
         Index(
             "uq_recordings_complete_station",
