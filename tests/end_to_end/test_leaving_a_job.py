@@ -69,6 +69,12 @@ def test_a_job_left_with_ctrl_c_is_paused_and_goes_on_only_when_it_is_asked_for(
     assert len(resumed.json()["result"]["lineage"]["recordings"]) == 12
 
 
+def _at_a_terminal() -> None:
+    """Make standard input the controlling terminal; hear its end also where the suite runs under nohup."""
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 def test_a_job_whose_terminal_is_closed_is_paused_and_its_bench_safe(tmp_path: Path) -> None:
     """It has no supervisor: a process that the hang-up killed left table and unit as they were until the next start."""
     terminal, its_end = os.openpty()
@@ -81,7 +87,7 @@ def test_a_job_whose_terminal_is_closed_is_paused_and_its_bench_safe(tmp_path: P
         stdout=its_end,
         stderr=its_end,
         start_new_session=True,
-        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+        preexec_fn=_at_a_terminal,
     ) as run:
         os.close(its_end)
         until = monotonic_s() + 60
@@ -102,15 +108,18 @@ def test_a_job_whose_terminal_is_closed_is_paused_and_its_bench_safe(tmp_path: P
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_such_a_signal_interrupts_once_and_nothing_interrupts_the_end(number: signal.Signals) -> None:
-    before = signal.getsignal(number)
-    with ending_like_ctrl_c() as ignore:
-        with pytest.raises(KeyboardInterrupt):
+    before = signal.signal(number, signal.SIG_DFL)  # the suite may run under nohup
+    try:
+        with ending_like_ctrl_c() as ignore:
+            with pytest.raises(KeyboardInterrupt):
+                os.kill(os.getpid(), number)
+            os.kill(os.getpid(), number)  # as terminal and shell do
+        with ending_like_ctrl_c() as ignore:
+            ignore()
             os.kill(os.getpid(), number)
-        os.kill(os.getpid(), number)  # as terminal and shell do
-    with ending_like_ctrl_c() as ignore:
-        ignore()
-        os.kill(os.getpid(), number)
-    assert signal.getsignal(number) == before
+        assert signal.getsignal(number) == signal.SIG_DFL
+    finally:
+        signal.signal(number, before)
 
 
 def test_a_command_under_nohup_outlives_its_terminal() -> None:

@@ -102,7 +102,7 @@ def test_a_job_that_a_person_cancels_is_not_tried_again_one_of_a_stopped_bench_i
 def test_the_log_tells_what_became_of_steps_and_run(laboratory: Laboratory, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO", logger="bench_service.campaigns.run_log")
     run = laboratory.done(new_run(campaign({"retries": 1}, {})), "DeviceFault", PASS, FAIL)
-    said = [record.getMessage() for record in caplog.records]
+    said = [r.getMessage() for r in caplog.records if r.name == "bench_service.campaigns.run_log"]
     assert said[0] == f"campaign run {run.id} of trial on U-1 is running"
     assert "step a, attempt 1" in said
     assert any(line.startswith("step a is queued: attempt 1:") and "the table said so" in line for line in said)
