@@ -84,8 +84,7 @@ def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], b
     runner = JobRunner(stores, planner, driver, "test", lease_held)
     worker = Worker(runner, lambda _: IdleEngine(), lambda *_: IdleDispatcher())
     service = BenchService(stores, driver, planner, worker, "test", safety_of(stores, driver))
-    service.register()
-    service.begin()
+    service.register()  # and no begin: nobody would end its threads, which would write into other tests' logs
     job = service.jobs.submit(
         JobRequest(procedure="calibration_12_orientations", unit="SIM-0001", parameters=FAST, seed=1)
     )

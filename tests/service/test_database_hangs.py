@@ -21,7 +21,6 @@ from bench_service.drivers.registered import RegisteredDevices
 from bench_service.jobs.runner import StepOutcome
 from bench_service.persistence import acquire_lease, open_stores
 from bench_service.persistence.bench.safety_books import SqlSafetyBooks
-from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench import Bench
@@ -92,14 +91,6 @@ def test_a_worker_sees_its_devices_and_its_own_end(
     def change(bench: Bench) -> None:
         bench.turntable._table.move_to = move
 
-    services: list[BenchService] = []
-    begin = BenchService.begin
-
-    def begun(service: BenchService) -> None:
-        services.append(service)
-        begin(service)
-
-    monkeypatch.setattr(BenchService, "begin", begun)
     stores, opened = open_stores(postgres.url)
     driver = FailingDriver(tmp_path, change)
     runner, job = prepared(stores, driver, lambda: True)
@@ -123,7 +114,6 @@ def test_a_worker_sees_its_devices_and_its_own_end(
                 pause(0.02)
         go_on.set()
     runner.end_early(job.id, StepOutcome(cancelled=True))
-    services[0].stop()
     opened.dispose()
 
 
