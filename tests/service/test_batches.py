@@ -31,7 +31,7 @@ def ended(client: Client, batch: dict) -> dict:
 
 def test_a_selection_is_analysed_once_and_a_second_batch_takes_what_is_stored(sqlite_client: Client, job: dict) -> None:
     wanted = {"job": job["id"], "labels": ["lot=7"], "procedure": job["procedure"]}
-    own = {"points": 25}  # no other test of the module, which may have run before this one, asks for this content
+    own = {"points": 37}  # no other test of the module, which may have run before this one, asks for this content
     first = ended(sqlite_client, submitted(sqlite_client, wanted, parameters=own))
     assert (first["state"], first["total"], first["counts"]["done"]) == ("succeeded", 12, 12)
     tasks = sqlite_client.http.get(f"{PATH}/{first['id']}/tasks", params={"limit": 5}).json()
@@ -52,7 +52,7 @@ def test_a_selection_is_analysed_once_and_a_second_batch_takes_what_is_stored(sq
     taken = sqlite_client.http.get(f"{PATH}/{second['id']}/tasks").json()["items"]
     assert {task["result"] for task in taken} == results
 
-    other = ended(sqlite_client, submitted(sqlite_client, wanted, parameters={"points": 20}))
+    other = ended(sqlite_client, submitted(sqlite_client, wanted, parameters={"points": 38}))
     assert other["counts"]["done"] == 12, "other parameters are another content"
     assert sqlite_client.http.get(PATH).json()["items"][0]["id"] == other["id"]
 
