@@ -1,4 +1,5 @@
-"""Search of lists by a text, along indexes. Knows which columns a text is sought in; must not know how lists are paged.
+"""Searches of jobs, recordings and results by a text, along indexes. Knows which columns a text is sought in, and how
+names of files stand in JSON documents; must not know how lists are paged.
 
 To look for a part of a word in every row costs what the history costs. A history has few different words: units,
 procedures, benches, people, stations and labels repeat. So the different values of a column are gone through first, by
@@ -6,19 +7,21 @@ one step along its index for each, and then only the rows that have one of those
 different, and are looked through in their index alone, where the text could be a part of one. Names of files and labels
 of stations may be of any length: the few long ones are no keys, and are read from their rows.
 
-Each list gets conditions of which at least one must hold; each of them is a walk along one index.
+A search gets conditions of which at least one must hold; each of them is a walk along one index.
 """
 
 import re
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, func, or_, select
+from sqlalchemy import ColumnElement, and_, exists, func, or_, select
+from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
+from sqlalchemy.sql.functions import FunctionElement
 
 from bench_service.model.job import job_number
-from bench_service.persistence.searching import imported_name_holds, long, short, text_held
-from bench_service.persistence.tables.evidence import RecordingRow, ResultRow
+from bench_service.persistence.tables.columns import is_long, is_short
+from bench_service.persistence.tables.evidence import NAMES_JOIN, RecordingRow, ResultRow
 from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
 
 MOST = 2000
@@ -35,6 +38,13 @@ _PART_OF_ID = re.compile(r"[0-9a-f-]{1,36}", re.IGNORECASE)
 _Column = InstrumentedAttribute[Any]
 
 
+class ImportedNames(FunctionElement[Any]):
+    """Names of the files in the `source` of an import, as rows."""
+
+    name = "imported_names"
+    inherit_cache = True
+
+
 def ways_to_jobs(session: Session, text: str) -> Ways:
     """Conditions of jobs, at least one of which holds where a job has the text."""
     named = (JobRow.procedure, JobRow.unit, JobRow.bench, JobRow.requested_by)
@@ -43,12 +53,12 @@ def ways_to_jobs(session: Session, text: str) -> Ways:
 
 def ways_to_recordings(session: Session, text: str) -> Ways:
     """Conditions of recordings, at least one of which holds where a recording or its job's labels have the text."""
-    label = _in_column(session, RecordingRow.station_label, text, short(RecordingRow.station_label))
-    names = imported_name_holds(text, _OTHER)
+    label = _in_column(session, RecordingRow.station_label, text, is_short(RecordingRow.station_label))
+    names = _imported_name_holds(text)
     by_row = (
-        and_(long(_OTHER.station_label), text_held(_OTHER.station_label, text)),
-        and_(short(_OTHER.file_names), names),
-        and_(long(_OTHER.file_names), names),
+        and_(is_long(_OTHER.station_label), _holds(_OTHER.station_label, text)),
+        and_(is_short(_OTHER.file_names), names),
+        and_(is_long(_OTHER.file_names), names),
     )
     of_job = tuple(RecordingRow.job_id.in_(select(JobRow.id).where(way)) for way in _in_ids(JobRow.id, text))
     return (
@@ -81,7 +91,7 @@ def _in_column(session: Session, column: _Column, text: str, *where: ColumnEleme
     """Return the condition that a column holds a text; None where no row does. `where`: see `_values`."""
     known = _values(session, column, text, where)
     if known is None or sum(known.values()) > LISTED:
-        return and_(*where, text_held(column, text))
+        return and_(*where, _holds(column, text))
     having = [value for value, held in known.items() if held]
     return and_(*where, column.in_(having)) if having else None
 
@@ -96,7 +106,7 @@ def _values(
     steps = select(func.min(column).label("value")).where(*where).cte("steps", recursive=True)
     following = select(func.min(column)).where(*where, column > steps.c.value).correlate(steps).scalar_subquery()
     steps = steps.union_all(select(following).where(steps.c.value.is_not(None)))
-    query = select(steps.c.value, text_held(steps.c.value, text)).where(steps.c.value.is_not(None)).limit(MOST + 1)
+    query = select(steps.c.value, _holds(steps.c.value, text)).where(steps.c.value.is_not(None)).limit(MOST + 1)
     found = session.execute(query).all()
     return None if len(found) > MOST else {value: bool(held) for value, held in found}
 
@@ -106,7 +116,7 @@ def _in_job(session: Session, job: ColumnElement[Any] | _Column, text: str) -> l
     pairs = list[ColumnElement[bool]]()
     names = _values(session, JobLabelRow.name, text, ())
     if names is None or len(names) > LABEL_NAMES:
-        pairs = [text_held(JobLabelRow.name, text), text_held(JobLabelRow.value, text)]
+        pairs = [_holds(JobLabelRow.name, text), _holds(JobLabelRow.value, text)]
     else:
         for name, held in names.items():
             named = JobLabelRow.name == name
@@ -125,3 +135,32 @@ def _in_ids(key: _Column, text: str) -> list[ColumnElement[bool]]:
         return [key == text.lower()]
     other = aliased(key.class_)
     return [key.in_(select(getattr(other, key.key)).where(getattr(other, key.key).contains(text.lower())))]
+
+
+def _holds(column: Any, text: str) -> ColumnElement[bool]:
+    """Return whether a column holds a text, capital or small."""
+    return column.icontains(text, autoescape=True)
+
+
+def _imported_name_holds(text: str) -> ColumnElement[bool]:
+    """Return whether the name of an imported file holds a text.
+
+    Names are stored joined by line breaks, so a text that has one is sought in each name by itself, too.
+    """
+    held = _holds(_OTHER.file_names, text)
+    if NAMES_JOIN in text:
+        files = ImportedNames(_OTHER.source).table_valued("name")
+        held = and_(held, exists(select(files.c.name).where(_holds(files.c.name, text))))
+    return and_(_OTHER.file_names.is_not(None), held)
+
+
+@compiles(ImportedNames, "sqlite")
+def _names_sqlite(element: ImportedNames, compiler: Any, **given: Any) -> str:
+    source = compiler.process(element.clauses, **given)
+    return f"(SELECT json_extract(value, '$.name') AS name FROM json_each({source}, '$.files'))"
+
+
+@compiles(ImportedNames, "postgresql")
+def _names_postgres(element: ImportedNames, compiler: Any, **given: Any) -> str:
+    source = compiler.process(element.clauses, **given)
+    return f"(SELECT value ->> 'name' AS name FROM json_array_elements({source} -> 'files'))"

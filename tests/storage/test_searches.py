@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bench_service.campaigns.stores import Stores
+from bench_service.model.batches import Selection
 from bench_service.model.job import Job
 from bench_service.model.records import NewRecording, StoredResult
 from bench_service.model.search import LabelSought, Search
@@ -178,7 +179,10 @@ def test_recordings_have_labels_and_verdict_of_their_job(
 
     def found(**given: Any) -> list[str]:
         search = {n: given.pop(n) for n in ("simulated", "job_id") if n in given}
-        return [r.info.id for r in stores.recordings.list(search=Search(**given), **search).items]
+        shown = [r.info.id for r in stores.recordings.list(search=Search(**given), **search).items]
+        selected = stores.batches.select(Selection(search=Search(**given), **search), 100)
+        assert [recording for recording, _, _ in selected] == shown[::-1]  # a batch takes what the list shows
+        return shown
 
     assert found(verdict=Verdict.FAIL) == [made[i] for i in (11, 8, 5, 2)]
     assert found(labels=(LabelSought("lot", "70"),)) == [made[7], made[1]]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import exists, insert, select, update
+from sqlalchemy import exists, insert, or_, select, update
 
 from bench_service.model.batches import AnalysisBatch, AnalysisTask, Selection, TaskState
 from bench_service.model.errors import IllegalTransition
@@ -24,6 +24,7 @@ from bench_service.persistence.searching import find_recordings
 from bench_service.persistence.tables.batches import BatchRow, TaskRecordingRow, TaskRow
 from bench_service.persistence.tables.evidence import RecordingRow
 from bench_service.persistence.tables.jobs import JobRow
+from bench_service.persistence.text_search import ways_to_recordings
 
 _GONE = tuple(state.value for state in GONE)
 
@@ -44,11 +45,13 @@ class SqlBatchStore(SqlBatchQueue):
         if selection.procedure is not None:
             of_job = RecordingRow.job_id == JobRow.id
             query = query.where(exists().where(of_job, JobRow.procedure == selection.procedure))
-        parts = [query]
-        if selection.ids:
-            parts = [query.where(RecordingRow.id.in_(ids)) for ids in in_parts(sorted(selection.ids))]
         found: list[tuple[str, str | None, str]] = []
         with self._database.read() as session:
+            if selection.search.text is not None:
+                query = query.where(or_(*ways_to_recordings(session, selection.search.text)))
+            parts = [query]
+            if selection.ids:
+                parts = [query.where(RecordingRow.id.in_(ids)) for ids in in_parts(sorted(selection.ids))]
             for part in parts:
                 rows = session.execute(part.order_by(RecordingRow.id).limit(limit - len(found)))
                 found += [(row.id, row.job_id, row.unit) for row in rows]

@@ -79,7 +79,7 @@ class SqlRecordingStore:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[StoredRecording]:
-        query = find_recordings(select(RecordingRow).where(RecordingRow.state != _OPEN), search, text=False)
+        query = find_recordings(select(RecordingRow).where(RecordingRow.state != _OPEN), search)
         if job_id is not None:
             query = query.where(RecordingRow.job_id == job_id)
         if unit is not None:

@@ -114,7 +114,7 @@ class SqlResultStore:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[StoredResult]:
-        query = find_results(select(ResultRow), search, text=False)
+        query = find_results(select(ResultRow), search)
         if job_id is not None:
             query = query.where(ResultRow.job_id == job_id)
         if unit is not None:

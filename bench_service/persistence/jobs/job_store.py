@@ -80,7 +80,7 @@ class SqlJobStore:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[Job]:
-        query = find_jobs(select(JobRow), search, text=False)
+        query = find_jobs(select(JobRow), search)
         if state is not None:
             query = query.where(JobRow.state == state.value)
         if procedure is not None:

@@ -9,11 +9,14 @@ from typing import Any
 
 from sqlalchemy import (
     JSON,
+    ColumnElement,
     DateTime,
     Dialect,
     Index,
     MetaData,
     String,
+    func,
+    literal_column,
     text,
 )
 from sqlalchemy.orm import DeclarativeBase, InstrumentedAttribute
@@ -79,3 +82,13 @@ def short_and_long(table: str, column: str) -> tuple[Index, Index]:
         Index(f"ix_{table}_{column}_id", column, "id", sqlite_where=short, postgresql_where=short),
         Index(f"ix_{table}_long_{column}", "id", sqlite_where=long, postgresql_where=long),
     )
+
+
+def is_short(column: Any) -> ColumnElement[bool]:
+    """Condition of the index of short texts; a bound that were a parameter would leave that index unused."""
+    return func.length(column) <= literal_column(str(KEY_LENGTH))
+
+
+def is_long(column: Any) -> ColumnElement[bool]:
+    """Condition of the index of long texts' rows, as `is_short`."""
+    return func.length(column) > literal_column(str(KEY_LENGTH))
