@@ -1,14 +1,15 @@
 """Correction sets in SQL: history and choice. They come in with the result that gives them (`result_store`)."""
 
+from collections.abc import Callable
 from datetime import datetime
-from typing import Any
 
 from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
 from bench_service.evidence.corrections import StoredCorrection
-from bench_service.model.calibrations import Act, Decider
+from bench_service.mapping import copied
+from bench_service.model.calibrations import Act, Approval, Decider
 from bench_service.model.errors import CorrectionRefused, NotFound
 from bench_service.model.records import Idempotency, Page
 from bench_service.persistence.database import Database
@@ -64,21 +65,13 @@ class SqlCorrectionStore:
     def make_current(
         self, unit: str, correction_id: str, by: Decider, idempotency: Idempotency | None = None
     ) -> StoredCorrection:
-        def once() -> StoredCorrection:
-            with self._database.write() as session:
-                row = _found(session, unit, correction_id)
-                if made_before(session, idempotency, "correction choice") is None:
-                    at = wall_clock.now()
-                    _require_remark(session, row, by)
-                    remember(session, idempotency, "correction choice", correction_id, at)
-                    _lock_all(session, unit, row.kind)
-                    retire_current(session, unit, row.kind)
-                    row.is_current = True
-                    session.add(_decision(correction_id, by, Act.CHOSEN, at))
-                    session.flush()
-                return _one(session, unit, correction_id)
+        def choose(session: Session, row: CorrectionRow) -> None:
+            _require_remark(session, row, by)
+            _lock_all(session, unit, row.kind)
+            retire_current(session, unit, row.kind)
+            row.is_current = True
 
-        return again_after_conflict(once)
+        return self._decided(unit, correction_id, by, Act.CHOSEN, "correction choice", idempotency, choose)
 
     def approve(
         self,
@@ -88,13 +81,19 @@ class SqlCorrectionStore:
         valid_until: datetime | None,
         idempotency: Idempotency | None = None,
     ) -> StoredCorrection:
-        until = {} if valid_until is None else {"valid_until": valid_until}
-        return self._decided(unit, correction_id, by, Act.APPROVED, idempotency, {"approval": "approved", **until})
+        def change(session: Session, row: CorrectionRow) -> None:
+            until = {} if valid_until is None else {"valid_until": valid_until}
+            _set(session, row, approval=Approval.APPROVED.value, **until)
+
+        return self._decided(unit, correction_id, by, Act.APPROVED, "correction approved", idempotency, change)
 
     def reject(
         self, unit: str, correction_id: str, by: Decider, idempotency: Idempotency | None = None
     ) -> StoredCorrection:
-        return self._decided(unit, correction_id, by, Act.REJECTED, idempotency, {"approval": "rejected"})
+        def change(session: Session, row: CorrectionRow) -> None:
+            _set(session, row, approval=Approval.REJECTED.value)
+
+        return self._decided(unit, correction_id, by, Act.REJECTED, "correction rejected", idempotency, change)
 
     def _decided(
         self,
@@ -102,25 +101,31 @@ class SqlCorrectionStore:
         correction_id: str,
         by: Decider,
         act: Act,
+        kind: str,
         idempotency: Idempotency | None,
-        values: dict[str, Any],
+        change: Callable[[Session, CorrectionRow], None],
     ) -> StoredCorrection:
         """Change a correction and note the decision in one transaction, unless its key is known."""
-        kind = f"correction {act.value}"
 
         def once() -> StoredCorrection:
             with self._database.write() as session:
-                _found(session, unit, correction_id)
+                row = _found(session, unit, correction_id)
                 if made_before(session, idempotency, kind) is None:
                     at = wall_clock.now()
                     remember(session, idempotency, kind, correction_id, at)
-                    session.execute(update(CorrectionRow).where(CorrectionRow.id == correction_id).values(**values))
-                    session.add(_decision(correction_id, by, act, at))
+                    change(session, row)
+                    given = {"id": wall_clock.new_id(), "correction_id": correction_id, "act": act.value, "at": at}
+                    session.add(copied(CorrectionDecisionRow, by, **given))
                     session.flush()
-                    session.expire_all()
                 return _one(session, unit, correction_id)
 
         return again_after_conflict(once)
+
+
+def _set(session: Session, row: CorrectionRow, **values: object) -> None:
+    """Write values as they are given now, also where the row was read with the same ones."""
+    session.execute(update(CorrectionRow).where(CorrectionRow.id == row.id).values(**values))
+    session.expire_all()
 
 
 def _require_remark(session: Session, row: CorrectionRow, by: Decider) -> None:
@@ -131,18 +136,6 @@ def _require_remark(session: Session, row: CorrectionRow, by: Decider) -> None:
             f"correction {row.id} of the kind {row.kind!r} comes from result {row.result_id}, whose verdict is "
             f"{verdict}: give a remark that says why it is used nevertheless"
         )
-
-
-def _decision(correction_id: str, by: Decider, act: Act, at: datetime) -> CorrectionDecisionRow:
-    return CorrectionDecisionRow(
-        id=wall_clock.new_id(),
-        correction_id=correction_id,
-        act=act.value,
-        at=at,
-        by=by.by,
-        proven=by.proven,
-        remark=by.remark,
-    )
 
 
 def _one(session: Session, unit: str, correction_id: str) -> StoredCorrection:
