@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from bench_service.formats.blocks import Block
-from bench_service.formats.bounds import COLUMNS, MEGABYTE, Bounds, listed, quoted
+from bench_service.formats.bounds import COLUMNS, MEGABYTE, Bounds, listed, not_one_column, quoted
 from bench_service.formats.clock_text import NoClock, nanoseconds
 from bench_service.formats.description import SECONDS, Column, ImportDescription
 from bench_service.formats.errors import UnreadableFile
@@ -195,8 +195,7 @@ def _indices(schema: Any, columns: Sequence[Column], name: str, timed: bool) -> 
 
 def _index(schema: Any, names: list[str], column: Column, name: str, is_time: bool) -> int:
     if isinstance(column, str) and names.count(column) != 1:
-        found_of = "more than one" if column in names else "no"
-        raise UnreadableFile(name, f"has {found_of} column {quoted(column)}; the columns are {listed(names)}")
+        raise UnreadableFile(name, not_one_column(column, names.count(column), listed(names)))
     index = names.index(column) if isinstance(column, str) else column
     if not 0 <= index < len(names):
         raise UnreadableFile(name, f"has no column {index}; it has {len(names)} columns, numbered from 0")

@@ -48,7 +48,8 @@ class TextSource:
         if encoding is None and 20 * glance[:4096].count(0) > len(glance[:4096]):
             raise UnreadableFile(
                 self._name,
-                "is not delimited text: it contains zero bytes, as a binary file does; give the format that wrote it",
+                "is not delimited text: it contains zero bytes, as a binary file does; if it is a log, give its format "
+                "(format), else export it as text",
             )
         if encoding is not None:
             self._decoder = codecs.getincrementaldecoder(encoding)(errors="replace")

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import BinaryIO
 
-from bench_service.formats.bounds import COLUMNS, LINE_BYTES, Bounds, listed, quoted
+from bench_service.formats.bounds import COLUMNS, LINE_BYTES, Bounds, listed, not_one_column, quoted
 from bench_service.formats.description import DELIMITERS, Column, ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.text_source import TextSource, too_long
@@ -151,21 +151,16 @@ class TextTable:
             if isinstance(column, str):
                 matches = [i for i, n in enumerate(self.names or []) if _same(n, column)]
                 if len(matches) != 1:
-                    found_of = "more than one" if matches else "no"
-                    raise UnreadableFile(
-                        self.name,
-                        f"has {found_of} column {quoted(column)}; the columns are {present}"
-                        f"{self._hint(column, len(matches))}",
-                    )
+                    hint = "" if matches else self._hint(column)
+                    raise UnreadableFile(self.name, not_one_column(column, len(matches), present) + hint)
                 column = matches[0]
             if not 0 <= column < self.width:
                 raise UnreadableFile(self.name, f"has no column {column}; the columns are {present}{self._wide()}")
             found.append(column)
         return found
 
-    def _hint(self, column: str, matches: int) -> str:
-        if matches > 1:
-            return f"; {matches} have this name: give the column by its number, from 0"
+    def _hint(self, column: str) -> str:
+        """Guess why no column has a name."""
         if self.names is None:
             return "; without a line of names (header = false) columns are given by number, from 0"
         if wide := self._wide():

@@ -72,6 +72,21 @@ def test_another_topic_by_its_name(mcap: bytes) -> None:
         proposed(mcap, table="/imu")
 
 
+@pytest.mark.parametrize(
+    ("column", "problem"),
+    [
+        ("gyro", r"table '/imu/data' has no column 'gyro'; the columns are header\.stamp, log_time"),
+        (99, r"table '/imu/data' has no column 99; it has \d+ columns, numbered from 0"),
+        (-1, r"table '/imu/data' has no column -1; it has \d+ columns, numbered from 0"),
+    ],
+)
+def test_a_column_that_a_topic_does_not_have_is_refused(mcap: bytes, column: str | int, problem: str) -> None:
+    description = proposed(mcap).description
+    first, *others = description["channels"]
+    with pytest.raises(UnreadableFile, match=problem):
+        read(mcap, {**description, "channels": [{**first, "column": column}, *others]})
+
+
 def test_a_cut_bag_is_read_as_far_as_it_goes_and_says_so(tmp_path: Path) -> None:
     data = bag1(tmp_path / "one.bag", None, chunk_bytes=20_000)
     cut = data[: len(data) * 2 // 3]

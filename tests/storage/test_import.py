@@ -94,6 +94,8 @@ def test_columnar_files(form: str) -> None:
         _read(sink.getvalue(), channels=[{**GYRO_X, "column": "s"}])
     with pytest.raises(UnreadableFile, match="has no column 'z'"):
         _read(sink.getvalue(), channels=[{**GYRO_X, "column": "z"}])
+    with pytest.raises(UnreadableFile, match="has no column -1; it has 4 columns, numbered from 0"):
+        _read(sink.getvalue(), channels=[{**GYRO_X, "column": -1}])
     with pytest.raises(UnreadableFile, match=r"a\.csv: cannot be read"):
         _read(sink.getvalue()[:200])
 

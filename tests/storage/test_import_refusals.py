@@ -37,7 +37,12 @@ REFUSALS: dict[str, Refusal] = {
     "nothing but a header": (HEAD, {}, UnreadableFile, "no rows"),
     "shorter than its header": ("a\nb\n", {"header_lines": 5}, UnreadableFile, "line 6 is empty"),
     "unknown column": ("x,z\n1,2\n", {}, UnreadableFile, "has no column 'y'; the columns are x, z"),
-    "column twice": ("x,y,y\n1,2,3\n", {}, UnreadableFile, "has more than one column 'y'"),
+    "column twice": (
+        "x,y,y\n1,2,3\n",
+        {},
+        UnreadableFile,
+        "has more than one column 'y'; the columns are x, y, y; 2 have this name: give the column by its number",
+    ),
     "index too large": (
         "1,2\n",
         {"header": False, "channels": [{**GYRO_X, "column": 2}]},

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bench_service.formats.blocks import Block
-from bench_service.formats.bounds import COLUMNS, Bounds, listed, quoted
+from bench_service.formats.bounds import COLUMNS, Bounds, listed, not_one_column, quoted
 from bench_service.formats.description import Column, ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.logs.table import Log, LogTable, Numbers, as_numbers, find_table
@@ -45,14 +45,15 @@ def _name(table: LogTable, column: Column, name: str) -> str:
     if len(have) > COLUMNS:
         raise UnreadableFile(name, f"table {quoted(table.name)} has {len(have)} columns, at most {COLUMNS} are read")
     if isinstance(column, int):
-        if column >= len(have):
-            raise UnreadableFile(name, f"there is no column {column}; table {quoted(table.name)} has {len(have)}")
+        if not 0 <= column < len(have):
+            raise UnreadableFile(
+                name, f"table {quoted(table.name)} has no column {column}; it has {len(have)} columns, numbered from 0"
+            )
         return have[column]
     if column not in have and table.clock(column) is None:
         times = [c.column for c in table.clocks if c.column not in have]
-        raise UnreadableFile(
-            name, f"there is no column {quoted(column)} in table {quoted(table.name)}; it has {listed([*times, *have])}"
-        )
+        problem = not_one_column(column, 0, listed([*times, *have]))
+        raise UnreadableFile(name, f"table {quoted(table.name)} {problem}")
     return column
 
 
