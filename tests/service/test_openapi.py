@@ -2,13 +2,16 @@
 
 import re
 import socket
+import tomllib
 from collections.abc import Callable, Generator, Iterator
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
+from bench_service.api.openapi import field_words
 from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 from tests.kit.kept_document import keeps_to_document
@@ -227,6 +230,19 @@ def test_every_field_has_a_description(document: dict[str, Any]) -> None:
     headless = ("Of ", "Who ", "Whoever ", "Whose ", "What he ", "Those ")
     described = [inside for one in schemas.values() for inside in one.get("properties", {}).values()]
     assert [inside["description"] for inside in described if inside["description"].startswith(headless)] == []
+
+
+def test_every_entry_of_the_table_of_descriptions_describes_a_field(document: dict[str, Any]) -> None:
+    """An entry is in use where a field that its key fits, and no more special key, has its text."""
+    table: dict[str, str] = tomllib.loads(Path(field_words.__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    used = set[str]()
+    for name, schema in document["components"]["schemas"].items():
+        for field, inside in schema.get("properties", {}).items():
+            patterns = [key for key in table if "*" in key and fnmatchcase(f"{name}.{field}", key)]
+            key = next((key for key in (f"{name}.{field}", *patterns, field) if key in table), None)
+            if key is not None and inside["description"].startswith(table[key].rstrip(".")):
+                used.add(key)
+    assert table.keys() - used == set()
 
 
 def test_the_pages_of_result_and_campaign_documents_are_those_of_the_schemas(document: dict[str, Any]) -> None:
