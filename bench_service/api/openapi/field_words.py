@@ -7,7 +7,7 @@ class, and by `field_words.toml`. The unit follows from the end of the name, as 
 import ast
 import sys
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
@@ -95,7 +95,12 @@ def _table() -> dict[str, str]:
 def _of_class(classes: tuple[type, ...], fields: Mapping[str, Any]) -> dict[str, str]:
     """Docstrings of the attributes of the class that has all fields of a schema and the fewest others."""
     every = [
-        {name: text for base in reversed(one.__mro__) if _is_ours(base) for name, text in _attributes(base).items()}
+        {
+            name: text
+            for base in reversed(one.__mro__)
+            if _is_ours(base)
+            for name, text in _documented(base.__module__).get(base.__name__, {}).items()
+        }
         for one in classes
     ]
     fitting = sorted((found for found in every if found.keys() >= set(fields)), key=len)
@@ -119,16 +124,15 @@ def _classes(wanted: frozenset[str]) -> dict[str, tuple[type, ...]]:
 
 
 @cache
-def _parsed(module: str) -> dict[str, ast.ClassDef]:
+def _documented(module: str) -> dict[str, dict[str, str]]:
+    """Own attributes of each class of a module with their docstrings; the parsed source itself is not kept."""
     file = sys.modules[module].__file__
     body = ast.parse(Path(file).read_text(encoding="utf-8")).body if file is not None else []
-    return {node.name: node for node in body if isinstance(node, ast.ClassDef)}
+    return {node.name: _attributes(node.body) for node in body if isinstance(node, ast.ClassDef)}
 
 
-def _attributes(one: type) -> dict[str, str]:
-    """Names of a class's own annotated attributes, each with the docstring below it, or empty."""
-    node = _parsed(one.__module__).get(one.__name__)
-    body = [] if node is None else node.body
+def _attributes(body: Sequence[ast.stmt]) -> dict[str, str]:
+    """Names of the annotated attributes in a class's body, each with the docstring below it, or empty."""
     found: dict[str, str] = {}
     for statement, after in zip(body, [*body[1:], None], strict=True):
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
