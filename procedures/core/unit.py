@@ -17,6 +17,13 @@ from procedures.core.unit_correction import CorrectionKind
 
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 """Pattern of a serial that is safe in an address and in a file name."""
+CORRECTION_IDS: dict[CorrectionKind, str] = {
+    "thermal": "thermal_correction_id",
+    "converter": "converter_id",
+    "thermometers": "thermometers_id",
+    "gyros": "gyro_correction_id",
+}
+"""Kind of a correction -> the field of `Unit`, and of its stored form, with the id of the one in use."""
 
 
 @dataclass(frozen=True)
@@ -148,12 +155,7 @@ class Unit:
 
     def correction_id(self, kind: CorrectionKind) -> str | None:
         """Id of the current correction of a kind, or None."""
-        return {
-            "thermal": self.thermal_correction_id,
-            "converter": self.converter_id,
-            "thermometers": self.thermometers_id,
-            "gyros": self.gyro_correction_id,
-        }[kind]
+        return getattr(self, CORRECTION_IDS[kind])
 
     def why_withheld(self, kind: CorrectionKind) -> str:
         """The reason why the current correction of a kind may not be used; empty where it may, or there is none."""

@@ -25,12 +25,12 @@ def launched(
     return make
 
 
-def points(stores: Stores, before: str | None = None) -> list[float]:
+def points(stores: Stores, newest: StoredResult | None = None) -> list[float]:
     """Values of the trend, in units of the first launch."""
     unit = noise_parts.NOISE_DISPLAY["rad/s"]["quantization"][1]
     return [
         round(float(y) * unit)
-        for figure in noise_parts.noise_trends(stores, "U-1", True, before)
+        for figure in noise_parts.noise_trends(stores, "U-1", True, newest)
         for series in figure.series
         for y in series.y
     ]
@@ -47,5 +47,5 @@ def test_a_result_with_many_newer_ones_has_its_trend(
     mine = launched(3.0, job)
     for number in range(noise_parts.NOISE_RESULTS + 1):
         launched(10.0 + number)
-    assert points(stores, mine.id) == [1, 3]
+    assert points(stores, mine) == [1, 3]
     assert points(stores) == [10 + number for number in range(1, noise_parts.NOISE_RESULTS + 1)]

@@ -2,10 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
-from bench_service.evidence.reports.people_parts import moment
+from bench_service.evidence.reports.people_parts import moment, named
+from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.printed.digits import to_uncertainty, two_digits
-from bench_service.formats.printed.document import Block, Facts, PrintedTable
+from bench_service.formats.printed.document import Block, Facts, Heading, PrintedTable
 from bench_service.model.calibrations import StoredCalibration
+from bench_service.model.records import StoredResult
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.report import Figure, Series
 from procedures.core.units import DISPLAY
@@ -15,6 +17,24 @@ FACTOR = 2.0
 EXPANDED = "U is the expanded uncertainty, k = 2 (95.45 % of a normal distribution); values have its second digit."
 FIGURES = 30
 """Newest calibrations that a trend shows."""
+
+
+def found_before(stores: EvidenceStores, result: StoredResult) -> dict[str, StoredCalibration]:
+    """Triad -> the calibration that was in use when a result's job began."""
+    unit = result.context.get("unit") or {}
+    return {c.triad: c for c in stores.calibrations.several(unit.get("calibration_ids") or ())}
+
+
+def found_and_left(stores: EvidenceStores, one: StoredCalibration, found: StoredCalibration | None) -> Iterator[Block]:
+    """Coefficients of a calibration as left next to those as found, and their trend up to it.
+
+    `found`: the triad's earlier calibration; None, or this one itself: there is none to compare it with.
+    """
+    yield Heading(f"Calibration of the {one.triad} triad, as found and as left")
+    yield from coefficients(one, None if found is not None and found.id == one.id else found)
+    history = stores.calibrations.list(one.unit, triad=one.triad, limit=200).items
+    same = [c for c in history if c.made_at <= one.made_at and c.simulated == one.simulated]
+    yield from trends(same, one.triad)
 
 
 def coefficients(one: StoredCalibration, found: StoredCalibration | None) -> Iterator[Block]:
@@ -59,10 +79,9 @@ def facts(one: StoredCalibration) -> Iterator[tuple[str, str]]:
     ends = moment(one.valid_until) if one.valid_until else "no end is set"
     yield "valid until", ends
     for decision in one.decisions:
-        who = decision.by or "the rule"
-        known = "" if decision.proven or not decision.by else " (name as given)"
+        who = named(decision.by, decision.proven) or "the rule"
         remark = f": {decision.remark}" if decision.remark else ""
-        yield decision.act.value, f"{moment(decision.at)}, by {who}{known}{remark}"
+        yield decision.act.value, f"{moment(decision.at)}, by {who}{remark}"
 
 
 def trends(history: Sequence[StoredCalibration], triad: str) -> Iterator[Figure]:

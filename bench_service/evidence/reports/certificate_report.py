@@ -6,7 +6,7 @@ from typing import Any
 
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.reports import calibration_parts, condition_parts, context_parts, record_parts
-from bench_service.evidence.reports.result_report import SIMULATED, gathered, verdict_blocks
+from bench_service.evidence.reports.result_report import SIMULATED, verdict_blocks
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.certificate.document import DCC, SPACES
 from bench_service.formats.certificate.errors import CertificateRefused
@@ -24,7 +24,6 @@ from bench_service.formats.printed.document import (
 )
 from bench_service.model.calibrations import StoredCalibration
 from bench_service.model.job import Job
-from bench_service.model.records import StoredResult
 from procedures.core.errors import BadParameter
 
 CERTIFICATE = "certificate.xml"
@@ -38,17 +37,20 @@ def certificate_report(
     results = {c.result_id: stores.results.get(c.result_id) for c in calibrations if c.result_id is not None}
     identifier = root.findtext(".//dcc:coreData/dcc:uniqueIdentifier", "", SPACES)
     blocks = [*_warnings(calibrations, document), *_parties(root)]
+    found: dict[str, StoredCalibration] = {}
     for result in results.values():
         recordings = [stores.recordings.get(known) for known, _ in result.recordings]
         blocks += context_parts.identity(result.context, result.unit or "none")
         given = [c for c in calibrations if c.result_id == result.id]
-        found = gathered(stores, result, None).found
-        blocks += record_parts.found_and_left(stores, catalogue, result, found, given, None)
+        before = calibration_parts.found_before(stores, result)
+        found |= before
         job = None if result.job_id is None else read_job(result.job_id)
+        blocks += record_parts.found_and_left(stores, catalogue, result, before, given, job)
         at = context_parts.recorded_at(result, job, recordings)
         blocks += [*context_parts.mounting(result.context), *context_parts.instruments(result.context, at)]
         blocks += condition_parts.conditions(result.context, recordings)
-    blocks += _calibrations(stores, calibrations, list(results.values()))
+    for one in calibrations:
+        blocks += calibration_parts.found_and_left(stores, one, found.get(one.triad))
     for result in results.values():
         blocks += [*verdict_blocks(result), Heading("Results in detail"), *blocks_of(catalogue.report(result))]
         blocks += context_parts.hashes(result.recordings)
@@ -129,19 +131,6 @@ def _contact(one: Element) -> str:
     parts = ("name/dcc:content", "location/dcc:street", "location/dcc:postCode", "location/dcc:city")
     words = [one.findtext(f"dcc:{part}", "", SPACES) for part in (*parts, "location/dcc:countryCode", "eMail")]
     return ", ".join(filter(None, words))
-
-
-def _calibrations(
-    stores: EvidenceStores, calibrations: list[StoredCalibration], results: list[StoredResult]
-) -> Iterator[Block]:
-    found = {triad: c for r in results for triad, c in gathered(stores, r, None).found.items()}
-    for one in calibrations:
-        yield Heading(f"Calibration of the {one.triad} triad, as found and as left")
-        before = found.get(one.triad)
-        yield from calibration_parts.coefficients(one, None if before is None or before.id == one.id else before)
-        history = stores.calibrations.list(one.unit, triad=one.triad, limit=200).items
-        same = [c for c in history if c.made_at <= one.made_at and c.simulated == one.simulated]
-        yield from calibration_parts.trends(same, one.triad)
 
 
 def _verdict(calibrations: list[StoredCalibration]) -> str:

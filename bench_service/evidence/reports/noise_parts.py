@@ -59,12 +59,14 @@ def noise_change(before: Unit, after: Unit) -> Iterator[PrintedTable]:
         yield PrintedTable("Noise in the record of the unit", columns, tuple(rows), (3, 4), NOT_SEEN)
 
 
-def noise_trends(stores: EvidenceStores, serial: str, simulated: bool, before: str | None = None) -> Iterator[Figure]:
+def noise_trends(
+    stores: EvidenceStores, serial: str, simulated: bool, newest: StoredResult | None = None
+) -> Iterator[Figure]:
     """Noise coefficients over the unit's static launches, oldest first; none with fewer than two results.
 
-    With `before`, the id of a result, only this result and older ones.
+    `newest`: only this result and older ones; None: up to the unit's newest.
     """
-    documents = [d["channels"] for d in _documents(stores, serial, simulated, before)][::-1]
+    documents = [d["channels"] for d in _documents(stores, serial, simulated, newest)][::-1]
     if len(documents) < 2:
         return
     for triad, channels in TRIADS.items():
@@ -77,10 +79,12 @@ def noise_trends(stores: EvidenceStores, serial: str, simulated: bool, before: s
                 yield Figure(title, "static run, oldest first", f"{name}, {unit}", series, note=note)
 
 
-def _documents(stores: EvidenceStores, serial: str, simulated: bool, before: str | None) -> Iterator[dict[str, Any]]:
+def _documents(
+    stores: EvidenceStores, serial: str, simulated: bool, newest: StoredResult | None
+) -> Iterator[dict[str, Any]]:
     """Documents of the unit's static launches, newest first, the newest analysis of each job."""
     jobs: set[str | None] = set()
-    for result in islice(_launches(stores, serial, before), MOST_READ):
+    for result in islice(_launches(stores, serial, newest), MOST_READ):
         if result.simulated == simulated and result.job_id not in jobs:
             jobs.add(result.job_id)
             yield result.document
@@ -88,11 +92,11 @@ def _documents(stores: EvidenceStores, serial: str, simulated: bool, before: str
             return
 
 
-def _launches(stores: EvidenceStores, serial: str, first: str | None) -> Iterator[StoredResult]:
-    """Results of the unit's static launches, newest first, one by one; from the result `first` on where it is given."""
-    if first is not None:
-        yield stores.results.get(first)
-    after, more = first, True
+def _launches(stores: EvidenceStores, serial: str, newest: StoredResult | None) -> Iterator[StoredResult]:
+    """Results of the unit's static launches, newest first, read one by one; `newest`: this result and older ones."""
+    if newest is not None:
+        yield newest
+    after, more = None if newest is None else newest.id, True
     while more:
         page = stores.results.list(unit=serial, name=LAUNCHES, after=after, limit=1)
         yield from page.items

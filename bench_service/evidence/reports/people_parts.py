@@ -8,10 +8,18 @@ from bench_service.model.job import Job
 from bench_service.model.notes import UnitNote
 from bench_service.model.records import StoredResult
 
+REMARKS = 50
+"""Newest remarks about the unit that a report has."""
+
 
 def moment(at: datetime | None) -> str:
     """A time to the second, in UTC with the zone named; a dash for none."""
     return "–" if at is None else f"{at.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def named(by: str, proven: bool) -> str:
+    """Name of a person, marked where the request declared it without a log-in; empty for none."""
+    return by if proven or not by else f"{by} (name as given)"
 
 
 def people(result: StoredResult, job: Job | None) -> Iterator[Block]:
@@ -36,8 +44,5 @@ def remarks(notes: Sequence[UnitNote]) -> Iterator[Block]:
     if not notes:
         return
     yield Heading("Remarks about the unit")
-    rows = tuple(
-        (moment(note.at), note.by if note.proven or not note.by else f"{note.by} (name as given)", note.text)
-        for note in notes
-    )
+    rows = tuple((moment(note.at), named(note.by, note.proven), note.text) for note in notes)
     yield PrintedTable("", ("at", "by", "remark"), rows)

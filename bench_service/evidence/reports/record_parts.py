@@ -14,16 +14,9 @@ from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 from procedures.core.errors import DomainError
 from procedures.core.recording import TRIADS
-from procedures.core.unit import TriadRecord, Unit
+from procedures.core.unit import CORRECTION_IDS, TriadRecord, Unit
 
 UNIT: TypeAdapter[Unit] = TypeAdapter(Unit)
-CORRECTION_IDS = {
-    "thermal": "thermal_correction_id",
-    "converter": "converter_id",
-    "thermometers": "thermometers_id",
-    "gyros": "gyro_correction_id",
-}
-"""Kind of a correction -> the field of a stored context's unit with the id of the one in use."""
 
 
 def found_and_left(

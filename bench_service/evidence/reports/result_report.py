@@ -35,8 +35,6 @@ from bench_service.model.records import StoredResult
 
 SIMULATED = "SIMULATED: the data come from a simulated bench and no real unit."
 RESULT = "result.json"
-REMARKS = 50
-"""Newest remarks about the unit that a report has."""
 SIMPLE = "simple acceptance, the uncertainty of a value is not taken off"
 
 
@@ -54,10 +52,8 @@ class ResultReport:
 
 def gathered(stores: EvidenceStores, result: StoredResult, job: Job | None) -> ResultReport:
     """Gather what a result's report needs."""
-    unit = result.context.get("unit") or {}
-    before = stores.calibrations.several(unit.get("calibration_ids") or ())
     given = stores.calibrations.of_results([result.id])
-    return ResultReport(result, job, tuple(given), {c.triad: c for c in before})
+    return ResultReport(result, job, tuple(given), calibration_parts.found_before(stores, result))
 
 
 def result_report(stores: EvidenceStores, catalogue: Catalogue, of: ResultReport) -> PrintedDocument:
@@ -66,7 +62,7 @@ def result_report(stores: EvidenceStores, catalogue: Catalogue, of: ResultReport
     blocks = [*_head(of), *context_parts.identity(result.context, result.unit or "none")]
     blocks += record_parts.found_and_left(stores, catalogue, result, of.found, of.calibrations, of.job)
     if result.unit:
-        blocks += people_parts.remarks(stores.unit_notes.list(result.unit, limit=REMARKS).items)
+        blocks += people_parts.remarks(stores.unit_notes.list(result.unit, limit=people_parts.REMARKS).items)
     recordings = [stores.recordings.get(known) for known, _ in result.recordings]
     if result.context:
         at = context_parts.recorded_at(result, of.job, recordings)
@@ -78,7 +74,7 @@ def result_report(stores: EvidenceStores, catalogue: Catalogue, of: ResultReport
     if sections:
         blocks += [Heading("Results in detail"), *([Paragraph(report.summary)] if report.summary else []), *sections]
     if result.unit and result.name == noise_parts.LAUNCHES:
-        trends = tuple(noise_parts.noise_trends(stores, result.unit, result.simulated, result.id))
+        trends = tuple(noise_parts.noise_trends(stores, result.unit, result.simulated, result))
         blocks += [Heading("Noise of the unit from one static run to the next"), *trends] if trends else []
     blocks += [
         *people_parts.people(result, of.job),
@@ -173,11 +169,7 @@ def _check(c: dict[str, Any]) -> tuple[str, ...]:
 def _calibrations(stores: EvidenceStores, of: ResultReport) -> Iterator[Block]:
     """Coefficients as found and as left, and their trend up to this result."""
     for one in of.calibrations:
-        yield Heading(f"Calibration of the {one.triad} triad, as found and as left")
-        yield from calibration_parts.coefficients(one, of.found.get(one.triad))
-        history = stores.calibrations.list(one.unit, triad=one.triad, limit=200).items
-        older = [c for c in history if c.made_at <= one.made_at and c.simulated == one.simulated]
-        yield from calibration_parts.trends(older, one.triad)
+        yield from calibration_parts.found_and_left(stores, one, of.found.get(one.triad))
     if not of.calibrations and of.found:
         yield Heading("Calibrations in use")
         yield Paragraph("The result left the unit's calibrations as it found them.")

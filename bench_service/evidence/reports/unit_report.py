@@ -5,7 +5,6 @@ from datetime import datetime
 
 from bench_service.evidence.corrections import StoredCorrection
 from bench_service.evidence.reports import calibration_parts, noise_parts, people_parts
-from bench_service.evidence.reports.result_report import REMARKS
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.printed.document import Block, Facts, Heading, Paragraph, PrintedDocument, PrintedTable
 from bench_service.model.calibrations import StoredCalibration
@@ -23,7 +22,7 @@ def unit_report(stores: EvidenceStores, serial: str) -> PrintedDocument:
     history = stores.calibrations.list(serial, limit=200).items
     results = stores.results.list(unit=serial, limit=RESULTS).items
     corrections = stores.corrections.list(serial, limit=200).items
-    notes = stores.unit_notes.list(serial, limit=REMARKS).items
+    notes = stores.unit_notes.list(serial, limit=people_parts.REMARKS).items
     blocks: list[Block] = [*_identity(unit), *people_parts.remarks(notes), *_noise(stores, unit, results)]
     blocks += [*_calibrations(history), *_corrections(corrections), *_results(results)]
     moments = [c.made_at for c in (*history, *corrections)] + [r.created_at for r in results] + [n.at for n in notes]
