@@ -165,7 +165,7 @@ def test_a_batch_is_started_from_a_search_followed_and_asked_for_its_failures(
     expect(short.locator(".badge")).to_have_text("failed")
     short.get_by_text("Results and failures").click()
     expect(short).to_contain_text("too few for a noise analysis")
-    expect(short.get_by_role("button", name="Once more")).to_be_visible()
+    expect(short.get_by_role("button", name="Retry")).to_be_visible()
 
 
 def test_a_batch_takes_what_the_last_search_shows_and_a_job_by_its_number(

@@ -44,17 +44,20 @@ function look(batch) {
   return details;
 }
 
+/** The one verb that a batch can take now. */
+function offered(batch) {
+  if (OPEN.includes(batch.state)) return "cancel";
+  return batch.counts.failed + batch.counts.cancelled ? "retry" : "none";
+}
+
 function verbs(batch) {
-  const path = `${BATCHES}/${batch.id}`;
-  if (OPEN.includes(batch.state)) {
-    return verb(t("Cancel"), { path: `${path}/cancel`, kind: "danger", then: show,
-      confirm: { title: t("Cancel this batch?"), lost: t("What waits is not analysed. What runs ends by itself, and results stay."), verb: t("Cancel the batch") } });
-  }
-  return batch.counts.failed + batch.counts.cancelled ? verb(t("Once more"), { path: `${path}/retry`, then: show }) : "";
+  const path = `${BATCHES}/${batch.id}`, offer = offered(batch);
+  if (offer === "retry") return verb(t("Retry"), { path: `${path}/retry`, then: show });
+  return offer === "none" ? "" : verb(t("Cancel"), { path: `${path}/cancel`, kind: "danger", then: show,
+    confirm: { title: t("Cancel this batch?"), lost: t("Waiting tasks are not analysed. Running tasks end by themselves, and all results are kept."), verb: t("Cancel the batch") } });
 }
 
 const progress = (batch) => [h("progress", { max: Math.max(1, batch.total), value: ended(batch), "aria-label": t("Progress of the batch") }), " ", t("{n} of {all}", { n: ended(batch), all: batch.total }), h("br"), h("span", { class: "note" }, counted(batch.counts))];
-const offered = (batch) => OPEN.includes(batch.state) ? "cancel" : batch.counts.failed + batch.counts.cancelled ? "retry" : "none";
 
 /** Cells of a row, each with what it depends on: a cell that stays the same is not made again, and keeps the focus. */
 const CELLS = [

@@ -63,7 +63,7 @@ async function analyse(event) {
   if (!made) return;
   if (made.page) { location.href = made.page; return; }
   key = crypto.randomUUID();
-  at("refusal").textContent = t("The batch is queued: its progress stands below.");
+  at("refusal").textContent = t("The batch is queued: its progress is shown below.");
   await batches.show();
   document.getElementById("batches").scrollIntoView({ block: "nearest" });
 }
