@@ -27,7 +27,7 @@ def page(
 ) -> Page[T]:
     """The next `limit` rows older than `after`, each made an item; one of which none can be made is left out.
 
-    `either`: conditions of which at least one must hold, each found by an index of its own; None for no such thing.
+    `either`: conditions of which at least one must hold, each found by an index of its own; None: no such condition.
     """
     if after is not None:
         query = query.where(key < after)

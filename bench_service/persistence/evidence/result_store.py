@@ -26,7 +26,13 @@ from bench_service.persistence.evidence.result_rows import (
     result_of_row,
     row_of_result,
 )
-from bench_service.persistence.evidence.result_values import AT_ONCE, DOCUMENTS, OfVerdicts, value_of_row, values_query
+from bench_service.persistence.evidence.result_values import (
+    AT_ONCE,
+    DOCUMENTS,
+    VerdictResults,
+    value_of_row,
+    values_query,
+)
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
 from bench_service.persistence.searching import find_results
@@ -127,7 +133,7 @@ class SqlResultStore:
             return Page(_results(session, rows.items), rows.next)
 
     def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
-        results = OfVerdicts(unit, procedure, simulated)
+        results = VerdictResults(unit, procedure, simulated)
         with self._database.read() as session:
             newest = next(results.newest_first(session, select(ResultRow.id), at_once=DOCUMENTS), None)
             return None if newest is None else _results(session, [_found(session, newest.id)])[0]
@@ -143,7 +149,8 @@ class SqlResultStore:
         before: str | None = None,
         parameters: dict[str, Any] | None = None,
     ) -> tuple[ResultValue, ...]:
-        results, at_once = OfVerdicts(unit, procedure, simulated), DOCUMENTS if quantity.startswith("/") else AT_ONCE
+        results = VerdictResults(unit, procedure, simulated)
+        at_once = DOCUMENTS if quantity.startswith("/") else AT_ONCE
         with self._database.read() as session:
             rows = results.newest_first(session, values_query(quantity), before, at_once)
             same = (row for row in rows if parameters is None or row.parameters == parameters)

@@ -22,7 +22,7 @@ from bench_service.persistence.tables.jobs import JobRow
 from procedures.core.imu_model import COEFFICIENT_NAMES
 
 AT_ONCE, DOCUMENTS = 250, 20
-"""Number of results looked at at once, and where the quantity is a JSON pointer, each with its document."""
+"""Number of results that one statement reads; of results with their documents (the quantity is a JSON pointer)."""
 ABOUT = (
     ResultRow.id,
     ResultRow.job_id,
@@ -34,7 +34,7 @@ ABOUT = (
 
 
 @dataclass(frozen=True)
-class OfVerdicts:
+class VerdictResults:
     """The results that gave jobs of a unit their verdict; no repeated analyses."""
 
     unit: str
