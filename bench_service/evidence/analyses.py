@@ -148,8 +148,6 @@ class AnalysisService:
         corrections = method.corrections(outcome)
         if corrections and inputs.serial is None:
             raise BadParameter("unit", None, "the serial of the unit whose correction this is to be")
-        kinds = () if inputs.unit is None else method.uses_corrections(outcome)
-        applied = [inputs.unit.correction_id(kind) for kind in kinds if inputs.unit is not None]
         stored = StoredResult(
             id=new_id(),
             kind="method",
@@ -164,7 +162,7 @@ class AnalysisService:
             simulated=inputs.simulated,
             created_at=now(),
             unit=inputs.serial,
-            corrections=tuple(c for c in applied if c is not None),
+            corrections=() if inputs.unit is None else inputs.unit.correction_ids(method.uses_corrections(outcome)),
         )
         return stored, method.calibrations(outcome), corrections
 

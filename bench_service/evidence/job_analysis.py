@@ -53,7 +53,6 @@ def analysed(
     if overdue:
         outcome = outcome.model_copy(update={"warnings": (*overdue, *outcome.warnings)})
     used = (context.unit.calibration_id(triad) for triad in procedure.uses_calibration)
-    corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(
         id=new_id(),
         kind="procedure",
@@ -71,7 +70,7 @@ def analysed(
         job_id=job.id,
         seed=job.seed,
         context=job.context,
-        corrections=tuple(c for c in corrections if c is not None),
+        corrections=context.unit.correction_ids(procedure.uses_corrections(params)),
     )
     found = Analysed(outcome, stored, procedure.calibrations(outcome), procedure.corrections(outcome))
     require_storable(found.calibrations, found.corrections)

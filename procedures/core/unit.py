@@ -1,5 +1,6 @@
 """Record of a unit before a job: its channels, its noise, its stability from launch to launch."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -153,9 +154,10 @@ class Unit:
         named = [f"{known} ({triad})" for triad in triads if (known := self.calibration_id(triad)) is not None]
         return f"calibration {', '.join(named) or 'of the unit'}"
 
-    def correction_id(self, kind: CorrectionKind) -> str | None:
-        """Id of the current correction of a kind, or None."""
-        return getattr(self, CORRECTION_IDS[kind])
+    def correction_ids(self, kinds: Iterable[CorrectionKind]) -> tuple[str, ...]:
+        """Ids of the current corrections of some kinds, in their order, without those that the unit does not have."""
+        known = (getattr(self, CORRECTION_IDS[kind]) for kind in kinds)
+        return tuple(correction for correction in known if correction is not None)
 
     def why_withheld(self, kind: CorrectionKind) -> str:
         """The reason why the current correction of a kind may not be used; empty where it may, or there is none."""
