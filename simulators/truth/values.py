@@ -77,7 +77,7 @@ class OperatorTruth:
     """Accuracy and speed of the person at the bench who sets the unit by hand. Ours."""
 
     fixture_tilt_sd_arcsec: float = 300.0
-    """Standard deviation of the unit's lean about each axis of its seat, a manual table, drawn independently each time."""
+    """Standard deviation of the unit's lean about each axis of its seat, a manual table; independent each time."""
     set_by_hand_s: float = 300.0
     """Bench time from the door's opening to its closing; the unit is set halfway."""
 
