@@ -25,7 +25,7 @@ from procedures.analysis.response.plan import (
     predicted_lags,
 )
 from procedures.analysis.response.summary import ChannelResponse, DynamicResponse, analyse_response
-from procedures.bench import Bench, BenchDescription
+from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
@@ -42,6 +42,7 @@ from procedures.procedure import (
     Procedure,
 )
 from procedures.reports.response import response_report
+from procedures.table_motion import require_possible
 
 Frequency = Annotated[float, Field(ge=0.01, le=1000.0)]
 Amplitude = Annotated[float, Field(gt=0.0, le=180.0)]
@@ -127,8 +128,10 @@ def predict(params: Params, context: Context) -> Prediction:
     """
     params = resolve(params, context)
     program = _program(params)
-    _require_possible(params, context)
-    duration_s = float(windows(program.stations(), context.bench.axis_motion)[-1, 1]) + program.beyond_stations_s()
+    stations = program.stations()
+    _require_shown(params, context.unit.sample_rate_hz)
+    require_possible("amplitudes_deg", params.amplitudes_deg, stations, context.bench)
+    duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1]) + program.beyond_stations_s()
     if context.unit.gyro is None:
         return Prediction(duration_s, (), ("the noise of the gyro triad is not known: nothing is predicted",))
     linearity = params.linearity_ppm * units.PPM
@@ -198,20 +201,12 @@ def _program(params: Params) -> ResponseProgram:
     )
 
 
-def _require_possible(params: Params, context: Context) -> None:
-    """Refuse sinusoids that the table cannot follow or the samples cannot show, before anything moves."""
-    bench: BenchDescription = context.bench
-    most_hz = HIGHEST_SHARE * context.unit.sample_rate_hz
+def _require_shown(params: Params, sample_rate_hz: float) -> None:
+    """Refuse frequencies that the unit's samples cannot show."""
+    most_hz = HIGHEST_SHARE * sample_rate_hz
     if params.frequencies_hz[-1] > most_hz:
-        allowed = (
-            f"at most {most_hz:g} Hz, {HIGHEST_SHARE:g} of the unit's sample rate of {context.unit.sample_rate_hz:g} Hz"
-        )
+        allowed = f"at most {most_hz:g} Hz, {HIGHEST_SHARE:g} of the unit's sample rate of {sample_rate_hz:g} Hz"
         raise BadParameter("frequencies_hz", params.frequencies_hz[-1], allowed)
-    for station in schedule(params):
-        if station.angles is None or station.sinusoid is None:
-            continue
-        if found := bench.sinusoid_violations(station.angles, station.sinusoid):
-            raise BadParameter("amplitudes_deg", params.amplitudes_deg, f"station {station.label}: {'; '.join(found)}")
 
 
 DELAY, BANDWIDTH = "gyro {} delay", "gyro {} bandwidth"
