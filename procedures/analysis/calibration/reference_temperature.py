@@ -100,6 +100,12 @@ class AtReference:
     """Covariance of the outputs from the correction's coefficients, common to all stations, (3, n, n)."""
     of_sensors: Array
     """Covariance of the outputs from the sensors' noise, (3, n, n)."""
+    correction: ThermalCorrection
+
+    @property
+    def by_cause(self) -> dict[str, Array]:
+        """Covariances of the outputs by the names that their causes have in a budget, (3, n, n) each."""
+        return {"thermal correction": self.of_correction, "thermometers": self.of_sensors}
 
     @property
     def covariance(self) -> Array:
@@ -206,6 +212,7 @@ def bring_to_reference(
         outputs - means.outputs,
         np.array(of_correction),
         np.array([np.diag(column) for column in of_sensors.T]),
+        correction,
     )
 
 
@@ -240,7 +247,7 @@ def gyros_at_reference(
     return replace(means, outputs=correction.apply(means.outputs, own)), covariance
 
 
-def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit) -> ThermalShare:
+def thermal_share(at: AtReference, fit: TriadFit) -> ThermalShare:
     """Effect of the thermal correction on the accelerometers' calibration, through the estimator of the fit."""
 
     def share(covariance: Array) -> dict[str, float]:
@@ -248,7 +255,7 @@ def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit)
         variance = np.einsum("kci,cij,kcj->k", gain, covariance, gain)
         return dict(zip(COEFFICIENT_NAMES, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
 
-    form = correction.axes[0].form
+    form = at.correction.axes[0].form
     return ThermalShare(
         form,
         "static" if form is Form.SWITCHED else "",
@@ -260,8 +267,9 @@ def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit)
     )
 
 
-def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[str, ...]:
-    """Warnings about the use of a correction at these temperatures."""
+def thermal_warnings(at: AtReference) -> tuple[str, ...]:
+    """Warnings about the use of the correction at these temperatures."""
+    correction = at.correction
     warnings = _of_range(at.temperatures, correction)
     unknown = [name for name, axis in zip("xyz", correction.axes, strict=True) if not axis.covariance]
     if unknown:
