@@ -99,8 +99,14 @@ class Result(Outcome):
 
     triads: tuple[TriadSummary, ...]
     extended: tuple[Extended, ...] = ()
-    thermal: ThermalShare | None = Field(None, exclude_if=lambda share: share is None, description="where corrected")
-    dwells: DwellsSaved | None = Field(None, exclude_if=lambda saved: saved is None, description="of a stop rule")
+    thermal: ThermalShare | None = Field(
+        None,
+        exclude_if=lambda share: share is None,
+        description="thermal correction of the accelerometers, where it was applied",
+    )
+    dwells: DwellsSaved | None = Field(
+        None, exclude_if=lambda saved: saved is None, description="dwells ended by the stop rule, and the time saved"
+    )
 
 
 def inputs_at(

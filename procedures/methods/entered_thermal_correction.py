@@ -48,7 +48,9 @@ class Params(Parameters):
     case_reference_c: float = Field(20.0, ge=-100.0, le=200.0, description="where the correction does nothing")
     converter_reference_c: float = Field(20.0, ge=-100.0, le=200.0)
     case_range_c: Range | None = Field(None, description="readings at which they were found; both ranges or none")
-    converter_range_c: Range | None = Field(None, description="of none, no use can say that it extrapolates")
+    converter_range_c: Range | None = Field(
+        None, description="[°C]; without ranges no use of the correction can warn that it extrapolates"
+    )
     form: Form = Form.BOTH
 
     @model_validator(mode="after")

@@ -58,7 +58,7 @@ class Params(FitParameters, RecordedParameters):
         "none", description="current: the unit's corrections bring both triads to their reference temperatures"
     )
     case_lag_s: Lag = Field(5.0, description="time constant of the case sensor; used by thermal_correction=current")
-    converter_lag_s: Lag = Field(5.0, description="the same of the converter's sensor")
+    converter_lag_s: Lag = Field(5.0, description="time constant of the converter's sensor")
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:

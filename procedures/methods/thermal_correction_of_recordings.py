@@ -46,22 +46,25 @@ class Params(RecordedParameters):
     up: tuple[Literal["x", "y", "z"], ...] | None = Field(
         None, min_length=1, max_length=100, description="axis upwards, one a recording; None: by the stations' angles"
     )
-    gravity_m_s2: float = Field(ge=9.7, le=9.9, description="where they were recorded")
+    gravity_m_s2: float = Field(ge=9.7, le=9.9, description="gravity where they were recorded")
     case_sensor: str = Field("temperature_case", description="channel that stands for the unit's temperature_case")
     converter_sensor: str | None = Field(
-        "temperature_converter", description="the same of temperature_converter; None: one sensor explains all"
+        "temperature_converter",
+        description="channel that stands for the unit's temperature_converter; None: one sensor explains all",
     )
     case_lag_s: Lag = Field(5.0, description="time constant of the sensor, by its data sheet")
     converter_lag_s: Lag = 5.0
     lag_sd_s: Lag = Field(0.05, description="standard uncertainty of each time constant")
     thermometers: bool = Field(True, description="correct sensors by the unit's current calibration of thermometers")
     converter: bool = Field(True, description="take out the unit's current models of its converter first (stage one)")
-    reference_case_c: float = Field(20.0, ge=-100.0, le=200.0, description="where the correction does nothing")
+    reference_case_c: float = Field(
+        20.0, ge=-100.0, le=200.0, description="reading at which the correction does nothing"
+    )
     reference_converter_c: float = Field(20.0, ge=-100.0, le=200.0)
     cell_s: float = Field(60.0, ge=1.0, le=600.0, description="cells that the fits work on")
     regime: Regime = Field(default_factory=lambda: Regime.model_validate({}))
     three_sigma_m_s2: float = Field(
-        0.0005, gt=0.0, le=100.0, description="of each axis' residuals at soaks, in sample (thesis 4.3)"
+        0.0005, gt=0.0, le=100.0, description="largest 3σ of each axis' residuals at soaks, in sample (thesis 4.3)"
     )
 
 
