@@ -24,7 +24,7 @@ LEVEL = 1e-3
 ONE_SIDED = 1.645
 """Factor of a limit that holds with 95 % (normal)."""
 SIGNIFICANT = 3.0
-"""Standard uncertainties by which q must be above zero for a time constant to be told."""
+"""Standard uncertainties by which q must be above zero for a time constant to be stated."""
 MOST_SCATTER_S = 1.0
 """Largest standard deviation of the delay from recording to recording that is taken for scattered stamps [s]."""
 
