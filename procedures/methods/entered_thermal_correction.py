@@ -54,14 +54,17 @@ class Params(Parameters):
     form: Form = Form.BOTH
 
     @model_validator(mode="after")
-    def _both_ranges(self) -> Self:
+    def _ranges(self) -> Self:
         if (self.case_range_c is None) != (self.converter_range_c is None):
             raise ValueError("case_range_c and converter_range_c: both or none")
+        for name, span in (("case_range_c", self.case_range_c), ("converter_range_c", self.converter_range_c)):
+            if span is not None and not span[0] <= span[1]:
+                raise ValueError(f"{name} = {span[0]:g}, {span[1]:g}: the lower temperature first")
         return self
 
     @property
     def fitted_range(self) -> TemperatureRange | None:
-        """The range of both sensors, where it is known. Raises `BadParameter` where it ends before it begins."""
+        """The range of both sensors, where it is known."""
         if self.case_range_c is None or self.converter_range_c is None:
             return None
         return TemperatureRange(self.case_range_c, self.converter_range_c)

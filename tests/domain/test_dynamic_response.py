@@ -195,6 +195,23 @@ def test_recordings_that_show_no_response_are_refused(context: Context, change: 
         RESPONSE.analyse(spoilt, params, context)
 
 
+def test_recordings_of_another_kind_are_refused(context: Context) -> None:
+    params, recordings = taken(context, SwungUnit())
+    info = recordings[0].info
+    station = info.station
+    assert station is not None
+    assert station.sinusoid is not None
+    counted = replace(info.channels[0], unit="count", scale=1.0)
+    slow = replace(station, sinusoid=replace(station.sinusoid, frequency_hz=1e-5))
+    for other, words in (
+        (replace(info, channels=(counted, *info.channels[1:])), "gyro_x is in count: a response needs a nominal scale"),
+        (replace(info, station=replace(station, sinusoid=None)), "its station has no sinusoid of the outer axis"),
+        (replace(info, station=slow), "cannot tell a sinusoid of 1e-05 Hz from a drift"),
+    ):
+        with pytest.raises(UnfitRecording, match=words):
+            RESPONSE.analyse([MemoryRecording(other, recordings[0].raw), *recordings[1:]], params, context)
+
+
 def test_three_recordings_at_two_frequencies_are_refused(context: Context) -> None:
     params, recordings = taken(context, SwungUnit())
     with pytest.raises(UnfitRecording, match="gyro_x: a delay and a lag need 3 frequencies, there are 2"):
