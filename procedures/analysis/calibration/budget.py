@@ -2,7 +2,7 @@
 
 A row has the source's value with its distribution and divisor, which make its standard uncertainty value/divisor, u(x).
 The sensitivity c carries that into the coefficient: contribution = c·u(x) (JCGM 100:2008, 5.1 and 8). Sources of many
-independent parts (a pointing error again at each station) have one value and the sensitivity of all parts together.
+independent parts (a pointing error, drawn at each station) have one value and the sensitivity of all parts together.
 """
 
 from collections.abc import Mapping, Sequence
