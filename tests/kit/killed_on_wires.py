@@ -98,7 +98,7 @@ def killed_in(kind: str, database_url: str, folder: Path, port: int) -> Generato
 
 
 def ask_for_lease(bench: BenchProcess) -> str:
-    """Ask for a lease of manual mode; its path."""
+    """Ask for a lease of manual mode; return its path."""
     lease = bench.client.post(MANUAL, json={"reason": "a look", "by": "ann", "unit": "GL017"})
     assert lease.status_code == 201, lease.text
     return f"{MANUAL}/{lease.json()['id']}"

@@ -43,7 +43,7 @@ LEVEL = 1e-3 / 24
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one unit: errors and claims of `NAMES`, preview of gain and delay, p-value; nan for what was not told."""
+    """Outcome of one unit: errors and claims of `NAMES`, preview of gain and delay, p-value; nan: not told."""
 
     errors: np.ndarray
     claimed: np.ndarray
