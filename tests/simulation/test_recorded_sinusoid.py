@@ -51,7 +51,7 @@ class FailingTable:
 
 
 def ended(quiet_config: Any, fault: BenchError | None, fails_after_s: float) -> tuple[BenchError, float]:
-    """What reading the recording raised, and how long after the end of the sinusoid [s]."""
+    """Error that reading the recording raised, and how long after the end of the sinusoid [s]."""
     bench = build(quiet_config())
     bench.imu._tapes._block_s = BLOCK_S
     station = Station(0, "x", TableAngles(), None, 0.0, RECORD_S, sinusoid=SWING)
