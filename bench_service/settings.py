@@ -106,7 +106,7 @@ class Settings(BaseModel):
     log_level: Literal["debug", "info", "warning", "error"] | None = None
     """Lowest level that is logged; None: info for a service, warning for a command that works in this process."""
     log_file: Path | None = None
-    """File for the log's lines, begun again at 10 MB, with the five before it kept; None: standard error."""
+    """File for the log's lines, rotated at 10 MB, with the five before it kept; None: standard error."""
     log_access: bool = False
     """True where every request is a line of the log."""
     traces_url: str | None = Field(None, pattern=r"^https?://\S+$")

@@ -17,11 +17,7 @@ from procedures.analysis.calibration.misfit import MISFIT_MAX
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
-from procedures.analysis.calibration.reference_temperature import (
-    ThermalShare,
-    thermal_share,
-    thermal_warnings,
-)
+from procedures.analysis.calibration.reference_temperature import ThermalShare, thermal_share, thermal_warnings
 from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
@@ -103,8 +99,14 @@ class Result(Outcome):
 
     triads: tuple[TriadSummary, ...]
     extended: tuple[Extended, ...] = ()
-    thermal: ThermalShare | None = Field(None, exclude_if=lambda share: share is None, description="where corrected")
-    dwells: DwellsSaved | None = Field(None, exclude_if=lambda saved: saved is None, description="of a stop rule")
+    thermal: ThermalShare | None = Field(
+        None,
+        exclude_if=lambda share: share is None,
+        description="thermal correction of the accelerometers, where it was applied",
+    )
+    dwells: DwellsSaved | None = Field(
+        None, exclude_if=lambda saved: saved is None, description="dwells ended by the stop rule, and the time saved"
+    )
 
 
 def inputs_at(
@@ -158,22 +160,21 @@ def calibrated(
     for triad, given in inputs.items():
         require_determined(params, triad, given)
         means, record = station_means(recordings, triad), unit.triad(triad) if unit else None
-        more, warm = None, None
+        more, brought = dict[str, Array](), None
         if unit is not None and lag_s is not None:
-            means, more, warm = brought_by_unit(recordings, means, unit, lag_s)
+            means, more, brought = brought_by_unit(recordings, means, unit, lag_s)
         scalar = params.scalar_check and triad == "accelerometer"
         of_inputs = (given.vectors, given.errors, given.magnitude, record)
         found = analyse_inputs(means, *of_inputs, scalar, params.weighting, more)
-        if warm is not None and unit is not None and unit.thermal_correction is not None:
-            share = thermal_share(warm, unit.thermal_correction, found[1])
-            doubts = thermal_warnings(warm, unit.thermal_correction)
+        if brought is not None:
+            share, doubts = thermal_share(brought, found[1]), thermal_warnings(brought)
         fitted.append(found)
         if kinds := params.terms_for(triad):
             noise, known = noise_of_means(means, record)
-            noise = noise + sum((more or {}).values())
+            noise = noise + sum(more.values())
             terms = terms_of(kinds, given.vectors, given.forces)
-            what, units = f"the {triad} coefficients", (means.output_unit, INPUT_UNITS[triad])
-            whole = fit_terms(what, given.vectors, means.outputs, noise, given.errors, terms, units, known)
+            what, in_units = f"the {triad} coefficients", (means.output_unit, INPUT_UNITS[triad])
+            whole = fit_terms(what, given.vectors, means.outputs, noise, given.errors, terms, in_units, known)
             extended.append(_extended(triad, means, whole))
     summaries = suspected(fitted)
     checks = tuple(c for t in summaries for c in _checks(t, _of(extended, t), params))

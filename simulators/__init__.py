@@ -13,7 +13,7 @@ Simulated
   brings too: accelerometer bias and scale, the signal converter, a gyro's perimeter control at fault, and the unit's
   own temperature sensors with lag, offset, noise, steps and faults. Temperatures go in whole seconds: what a second's
   end made of outputs and sensors holds until the next one's.
-* An operator who sets the unit by hand when asked, in minutes, in a seat that leans a little, again each time.
+* An operator who sets the unit by hand when asked, in minutes, in a seat that leans a little, differently each time.
 * A supply, and a clock: time passes only in ``clock.sleep`` and while a recording is read.
 
 Stated choices

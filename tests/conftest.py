@@ -1,4 +1,4 @@
-"""What more than one folder of tests needs: the databases to run on."""
+"""Fixtures of more than one folder of tests: the databases to run on."""
 
 import gc
 import os

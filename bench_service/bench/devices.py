@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Protocol
 
+from bench_service.bench.processes import ProcessIdentity
+
 AT_REST = "at rest"
 MOVING = "moving"
 
@@ -62,6 +64,14 @@ class DeviceState:
     def safe(self) -> bool:
         """Table at rest, unit off, chamber led to ambient, no current, and no fault in the way."""
         return not self.unsafe
+
+
+def commanded(state: DeviceState | None, worker: ProcessIdentity | None) -> bool:
+    """Return whether the living `worker`, None where there is none, has the devices' link.
+
+    It would command them next, so devices that are safe may not stay so until it has left its work after a stop.
+    """
+    return worker is not None and state is not None and state.linked
 
 
 class BenchDevices(Protocol):

@@ -194,21 +194,22 @@ class DrivenBench:
     def _cancel(self, future: "Future[Any]", why: str) -> None:
         """Cancel a coroutine on the bench's loop and wait until it has unwound, or is lost."""
         future.cancel()
-        unwound = self._unwound()
-        try:
-            waiting = asyncio.run_coroutine_threadsafe(unwound, self._loop)
-        except RuntimeError:  # another thread has ended the session, and its loop every task
-            unwound.close()
-            return
-        try:
-            waiting.result(UNWIND_S)
-        except CancelledError:  # as above, a moment later
-            return
-        except TimeoutError:
-            if self._closed:  # as above: its loop had stopped, and takes nothing more
-                return
+        if not self._unwinds():
             self._lost = why
             log.error("%s, bench %s: %s, and its driver does not return", self._name, self._bench.description.id, why)
+
+    def _unwinds(self) -> bool:
+        """Wait until the work has unwound, as it also has once another thread has ended the session; False: lost."""
+        unwound = self._unwound()
+        try:
+            asyncio.run_coroutine_threadsafe(unwound, self._loop).result(UNWIND_S)
+        except RuntimeError:  # the session's loop is closed
+            unwound.close()
+        except CancelledError:  # it has ended meanwhile
+            return True
+        except TimeoutError:  # it has stopped meanwhile, and takes nothing more; or the work does not return
+            return self._closed
+        return True
 
     async def _unwound(self) -> None:
         """Wait for every task of the bench's loop but those that wait here, or that make safe.

@@ -67,7 +67,7 @@ class ObservedTurntable(_Seen):
 
     def __init__(self, table: Turntable, observer: Observer) -> None:
         super().__init__(observer)
-        self._table, self.trace = table, table.trace
+        self._table, self.trace = table, table.trace  # it takes what was read: no verb to observe
 
     async def move_to(self, angles: TableAngles) -> None:
         with self._seen("turntable.move_to", angles_deg=[angles.outer_deg, angles.middle_deg, angles.inner_deg]):

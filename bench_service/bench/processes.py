@@ -62,6 +62,11 @@ class Driving:
         return not self.ended and self.process.alive()
 
 
+def living(driving: Driving | None) -> ProcessIdentity | None:
+    """The process that drives a bench from this host, if it is alive."""
+    return driving.process if driving is not None and driving.alive else None
+
+
 class Watch(Protocol):
     """The processes of one host that drive or supervise a bench, as they register themselves."""
 

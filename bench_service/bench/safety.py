@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from bench_service.bench.devices import BenchDevices, DeviceState
+from bench_service.bench.devices import BenchDevices, DeviceState, commanded
 from bench_service.bench.make_safe import Rescue, over_new_link
-from bench_service.bench.processes import ProcessIdentity, Watch
+from bench_service.bench.processes import ProcessIdentity, Watch, living
 from bench_service.bench.registry import BenchRegistry
 from bench_service.model.errors import NotFound, NotSafe
 from bench_service.model.records import BenchStop
@@ -39,8 +39,8 @@ class Safety:
 
     @property
     def commanded(self) -> bool:
-        """True while a living worker has the devices' link: it would command them next, and leaves after a stop."""
-        return self.worker is not None and self.devices is not None and self.devices.linked
+        """True while a living worker of this host has the devices' link (`bench_service.bench.devices.commanded`)."""
+        return commanded(self.devices, self.worker)
 
 
 class SafetyService:
@@ -64,9 +64,7 @@ class SafetyService:
         """The bench's safety as known now. Raises `StorageFailure`."""
         state = self._devices(bench_id).device_state()
         watch = self._watch(bench_id)
-        driving = watch.driving()
-        worker = driving.process if driving is not None and driving.alive else None
-        supervisor = watch.supervisor()
+        worker, supervisor = living(watch.driving()), watch.supervisor()
         if state is None:
             safe, explanation = _elsewhere(bench_id, self._benches.standing_stops(bench_id))
         else:
@@ -166,7 +164,7 @@ def _here(bench_id: str, state: DeviceState, worker: ProcessIdentity | None, sup
     if state.safe:
         return "The devices are safe: the table is at rest, the unit is off."
     unsafe = f"The devices are not safe: {', '.join(state.unsafe)}."
-    if worker is not None and state.linked:
+    if commanded(state, worker):
         return f"{unsafe} The worker, {worker}, drives them."
     if supervisor is not None:
         return f"{unsafe} No worker drives them; the supervisor, {supervisor}, makes them safe."

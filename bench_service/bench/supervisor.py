@@ -15,10 +15,10 @@ from collections.abc import Callable
 from threading import Event, Lock, Thread
 
 from bench_service.background import NonBlockingQuery
-from bench_service.bench.devices import BenchDevices, DeviceState
+from bench_service.bench.devices import BenchDevices, DeviceState, commanded
 from bench_service.bench.heartbeat import SILENT_S, HeartbeatFile
 from bench_service.bench.make_safe import over_new_link
-from bench_service.bench.processes import Driving, ProcessIdentity, Watch
+from bench_service.bench.processes import Driving, ProcessIdentity, Watch, living
 from bench_service.bench.stop.channel import SUPERVISOR, WORKER, StopChannel
 from bench_service.bench.stop.exchange import StopExchange
 from bench_service.bench.stop.word import StopAnswer
@@ -114,15 +114,15 @@ class Supervisor:
         """Look once, and act on it; False once a companion has nothing left to watch."""
         now_s = monotonic_s()
         driving, state = self._watch.driving(), self._devices.device_state()
-        alive = driving is not None and driving.alive
+        worker = living(driving)
         if state is not None and state.safe:  # whichever process made it safe
             self._told_not_safe, self._first_try_s = False, None
         self._look_for_stop(now_s)
-        words = self._answer_stop(state, alive)
+        words = self._answer_stop(state, worker)
         self._stopped = bool(words) or self._exchange.stopped
-        if driving is not None and driving.alive:
+        if worker is not None:
             self._gone_since_s = None
-            self._end_hung(now_s, driving, state, words)
+            self._end_hung(now_s, worker, state, words)
             self._look_for_left(now_s, state)
         else:
             self._patience.reset(now_s)
@@ -132,7 +132,7 @@ class Supervisor:
                 self._rescue(now_s, driving, state)
                 return True
         self._looked_s = now_s
-        return not companion or alive or not self._may_leave(now_s, driving, state)
+        return not companion or worker is not None or not self._may_leave(now_s, driving, state)
 
     def _may_leave(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> bool:
         """Return whether it may end: at once after an orderly end, later after a crash, never from an unsafe bench."""
@@ -157,9 +157,8 @@ class Supervisor:
         self._exchange.exchange()
         if self._listener is not None and (at := self._listener.listening()) is not None:
             self._books.say_listening(at)
-        driving, state = self._watch.driving(), self._devices.device_state()
-        commanded = state is not None and state.linked and driving is not None and driving.alive
-        if self._exchange.stopped and state is not None and state.safe and not commanded:
+        worker, state = living(self._watch.driving()), self._devices.device_state()
+        if self._exchange.stopped and state is not None and state.safe and not commanded(state, worker):
             self._books.confirm_safe(state.by)
         if self._unsaid_stop is not None:
             self._books.stop(self._unsaid_stop, self._by)
@@ -168,24 +167,26 @@ class Supervisor:
             self._books.note(self._by, *self._unsaid[0])
             self._unsaid.pop(0)
 
-    def _answer_stop(self, state: DeviceState | None, alive: bool) -> frozenset[str]:
+    def _answer_stop(self, state: DeviceState | None, worker: ProcessIdentity | None) -> frozenset[str]:
         """Answer the stop requests in the channel; their ids."""
         ids = frozenset(word.id for word in self._channel.standing())
         if ids:
             safe = self._channel.answered(SUPERVISOR).safe & ids
             if state is not None and state.safe:  # a worker that has their link says itself when it has left its work
-                safe |= self._channel.answered(WORKER).safe & ids if alive and state.linked else ids
+                safe |= self._channel.answered(WORKER).safe & ids if commanded(state, worker) else ids
             self._channel.answer(SUPERVISOR, StopAnswer(self._by, ids, safe))
         return ids
 
-    def _end_hung(self, now_s: float, driving: Driving, state: DeviceState | None, words: frozenset[str]) -> None:
+    def _end_hung(
+        self, now_s: float, worker: ProcessIdentity, state: DeviceState | None, words: frozenset[str]
+    ) -> None:
         """Kill a worker that leaves the devices unsafe under its link, and is unresponsive, silent or hung."""
         if state is None or state.safe or not state.linked:
             self._patience.reset(now_s)
             return
-        why = self._patience.over(now_s, driving.process, words, self._stopped)
-        if why is not None and driving.process.kill():
-            self._say(f"{driving.process} {why} ({', '.join(state.unsafe)}): killed", state.job)
+        why = self._patience.over(now_s, worker, words, self._stopped)
+        if why is not None and worker.kill():
+            self._say(f"{worker} {why} ({', '.join(state.unsafe)}): killed", state.job)
             self._patience.reset(now_s)
 
     def _look_for_left(self, now_s: float, state: DeviceState | None) -> None:
@@ -200,9 +201,9 @@ class Supervisor:
     def _rescue(self, now_s: float, driving: Driving | None, state: DeviceState) -> None:
         """Make an unsafe bench safe that no process drives."""
         lease = self._lease_within(LEASE_S)
-        again = self._watch.driving()
+        again = living(self._watch.driving())
         try:
-            if again is None or not again.alive:  # else a process took the bench this moment, and makes it safe itself
+            if again is None:  # else a process took the bench this moment, and makes it safe itself
                 self._try(now_s, f"{driving.process} is gone" if driving else "no process drives the bench", state)
         finally:
             if lease is not None:

@@ -50,14 +50,22 @@ def devices_of(folder: Path, bench_id: str, bench_file: Path | None = None) -> B
     and kept: a change of it holds from the process's next start.
     """
     register = DeviceRegister(folder, bench_id)
-    if bench_file is None:
-        state = register.read()
-        if state is None or not state.bench_file:
-            return RegisteredDevices(register)
-        bench_file = Path(state.bench_file)
+    file = _file_of(register, bench_file)
+    if file is None:
+        return RegisteredDevices(register)
     from bench_service.drivers.wired.devices import WiredDevices
 
-    return WiredDevices(partial(_kept, bench_file.absolute()), register)
+    return WiredDevices(partial(_kept, file), register)
+
+
+def _file_of(register: DeviceRegister, given: Path | None) -> Path | None:
+    """The bench file of real devices: the given one, else the one that their register remembers; None: simulated."""
+    if given is None:
+        state = register.read()
+        if state is None or not state.bench_file:
+            return None
+        given = Path(state.bench_file)
+    return given.absolute()
 
 
 @lru_cache(maxsize=16)
@@ -81,16 +89,13 @@ def longest_safe_s(settings: Settings) -> float:
     By the same bench file as `own_devices`. One that cannot be read any more counts as a table without a declaration:
     whoever waits too short would kill a worker in mid-braking.
     """
-    file = settings.bench_file
+    file = _file_of(DeviceRegister(settings.devices_in(), settings.bench_id), settings.bench_file)
     if file is None:
-        state = DeviceRegister(settings.devices_in(), settings.bench_id).read()
-        if state is None or not state.bench_file:
-            return 0.0
-        file = Path(state.bench_file)
+        return 0.0
     from bench_service.drivers.interface.sections import Wire, WireTurntable
 
     try:
-        devices = _kept(file.absolute()).real().values()
+        devices = _kept(file).real().values()
     except Misconfigured:
         return float(WireTurntable.model_fields["safe_s"].default)
     return max((device.safe_s for device in devices if isinstance(device, Wire)), default=0.0)

@@ -149,11 +149,7 @@ def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:
             return found
     if station.current_ma is not None:
         return bench.current_violations(station.current_ma, station.profile)
-    if station.angles is None:
-        return ()
-    if station.sinusoid is not None:
-        return bench.sinusoid_violations(station.angles, station.sinusoid)
-    return bench.violations(station.angles, station.turn, station.profile)
+    return bench.motion_violations(station)
 
 
 def _samples(station: Station, unit: Unit) -> int:

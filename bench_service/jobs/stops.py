@@ -95,18 +95,20 @@ class StopService:
             job, books = self._entered(entering, BOOKS_S)
             if books:
                 raise StorageFailure(f"{self._roads.unreached(bench_id, here)} ({books}; it is tried again)")
-            safety = self._safety_here(bench_id, patient) if here else self._safety.stopping_elsewhere(bench_id)
-        elif here:
-            safety = sent.safety or self._safety_here(bench_id, patient)
+            safety = self._safety_now(bench_id, here, patient)
+        else:
+            safety = sent.safety or self._safety_now(bench_id, here, patient)
             job, books = self._entered(entering, books_by_s - monotonic_s())
             job = job or (safety.devices.job if safety.devices is not None and safety.worker is not None else None)
-        else:
-            job, books = self._entered(entering, books_by_s - monotonic_s())
-            safety = sent.safety or self._safety.stopping_elsewhere(bench_id)
         return Stopped(BenchStop(bench_id, word.at, word.reason, by=word.by, id=word.id), job, safety, books)
 
-    def _safety_here(self, bench_id: str, patient: bool) -> Safety:
-        """The safety of a bench on this host; not known where its files cannot be read, for want of a descriptor."""
+    def _safety_now(self, bench_id: str, here: bool, patient: bool) -> Safety:
+        """The safety of a bench shortly after its stop; `here`: the bench is on this host.
+
+        It is not known where this host's files cannot be read, for want of a descriptor.
+        """
+        if not here:
+            return self._safety.stopping_elsewhere(bench_id)
         try:
             return self._safety.stopping(bench_id, patient)
         except OSError as error:

@@ -55,7 +55,7 @@ class JobStore(Protocol):
     ) -> Page[Job]: ...
 
     def counts(self, states: Collection[JobState] = tuple(JobState)) -> dict[JobState, int]:
-        """Number of jobs in each of some states; of the last states, that takes as long as the history is."""
+        """Number of jobs in each of some states; to count ended jobs takes the longer, the longer the history is."""
         ...
 
     def has_any(self) -> bool:

@@ -8,6 +8,7 @@ from procedures.bench.current_source import CurrentSourceLimits
 from procedures.bench.declared_device import DeclaredDevice
 from procedures.bench.supply import SupplyLimits
 from procedures.core.constant_rate import ConstantRate
+from procedures.core.recording import Station
 from procedures.core.sinusoid import PEAK_ACCELERATION, Sinusoid
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
@@ -119,6 +120,14 @@ class BenchDescription:
         if turn is not None:
             beyond += self._turn_violations(angles, turn)
         return beyond if profile is None else beyond + self._profile_violations(profile)
+
+    def motion_violations(self, station: Station) -> tuple[str, ...]:
+        """Violations of the limits by what a station demands of table and chamber; none where it names no angles."""
+        if station.angles is None:
+            return ()
+        if station.sinusoid is not None:
+            return self.sinusoid_violations(station.angles, station.sinusoid)
+        return self.violations(station.angles, station.turn, station.profile)
 
     def current_violations(self, current_ma: float, profile: TemperatureProfile | None) -> tuple[str, ...]:
         """Violations by a converter alone: of a current on its inputs, and of a profile that it soaks by."""

@@ -25,7 +25,7 @@ from procedures.analysis.response.plan import (
     predicted_lags,
 )
 from procedures.analysis.response.summary import ChannelResponse, DynamicResponse, analyse_response
-from procedures.bench import Bench, BenchDescription
+from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
@@ -42,11 +42,12 @@ from procedures.procedure import (
     Procedure,
 )
 from procedures.reports.response import response_report
+from procedures.table_motion import require_possible
 
 Frequency = Annotated[float, Field(ge=0.01, le=1000.0)]
 Amplitude = Annotated[float, Field(gt=0.0, le=180.0)]
 HIGHEST_SHARE = 0.4
-"""Share of the sample rate that a frequency may have: half of it is where samples tell no sinusoid apart."""
+"""Largest frequency as a share of the sample rate; at half of it samples no longer determine a sinusoid."""
 MOST_WITHIN_S = 100.0
 """Largest half interval of a reading, that of the slowest reading [s]."""
 
@@ -54,36 +55,40 @@ MOST_WITHIN_S = 100.0
 class Limits(Parameters):
     """Requirements on the unit, where there are any, and on the measurement (this program's own)."""
 
-    delay_ms: float | None = Field(None, gt=0.0, le=1e4, description="magnitude of the delay; None: not judged")
+    delay_ms: float | None = Field(None, gt=0.0, le=1e4, description="largest magnitude of the delay; None: not judged")
     bandwidth_hz: float | None = Field(None, gt=0.0, le=1e5, description="least bandwidth; None: not judged")
     stamp_scatter_ms: float | None = Field(
-        None, gt=0.0, le=1e4, description="of the delay from recording to recording; None: not judged"
+        None, gt=0.0, le=1e4, description="largest scatter of the delay from recording to recording; None: not judged"
     )
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
 
 
 class Params(JudgedParameters):
     """Frequencies and amplitudes of the sinusoids, and limits of the unit. None takes the bench's value."""
 
-    axes: tuple[Axis, ...] = Field(("x", "y", "z"), min_length=1, max_length=3, description="of the unit, each once")
+    axes: tuple[Axis, ...] = Field(("x", "y", "z"), min_length=1, max_length=3, description="axes of the unit")
     frequencies_hz: tuple[Frequency, ...] = Field(
         (0.5, 1.0, 2.0, 4.0, 6.0, 8.0), min_length=PARAMETERS, max_length=50, description="rising, each once"
     )
     amplitudes_deg: tuple[Amplitude, ...] | None = Field(
         None, max_length=50, description="one a frequency; None: 0.8 of what rate and acceleration allow, at most 5 deg"
     )
-    record_s: float = Field(20.0, ge=1.0, le=3600.0, description="at least, in whole cycles and at least ten of them")
+    record_s: float = Field(
+        20.0, ge=1.0, le=3600.0, description="least length of a recording; ten cycles are the least"
+    )
     slack_s: float = Field(
-        2.0, ge=0.0, le=600.0, description="for which the table swings on beyond its recording: samples may come late"
+        2.0, ge=0.0, le=600.0, description="time of the sinusoid after its recording: samples may come late"
     )
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
     linearity_ppm: float = Field(
         50.0, ge=0.0, le=1e5, description="standard uncertainty of the gyros' gain from one rate to another"
     )
     encoder_time_sd_s: float = Field(
-        0.0, ge=0.0, le=1.0, description="of the encoder's readings beyond the question's interval, alike for all"
+        0.0, ge=0.0, le=1.0, description="standard uncertainty of the readings' times that all have in common"
     )
-    encoder_sd_arcsec: float = Field(0.1, gt=0.0, le=3600.0, description="of one reading, for the preview alone")
+    encoder_sd_arcsec: float = Field(
+        0.1, gt=0.0, le=3600.0, description="standard deviation of one reading, for the preview alone"
+    )
     encoder_rate_hz: float = Field(
         50.0, ge=0.5 / MOST_WITHIN_S, le=1e5, description="readings a second, for the preview alone"
     )
@@ -127,8 +132,10 @@ def predict(params: Params, context: Context) -> Prediction:
     """
     params = resolve(params, context)
     program = _program(params)
-    _require_possible(params, context)
-    duration_s = float(windows(program.stations(), context.bench.axis_motion)[-1, 1]) + program.beyond_stations_s()
+    stations = program.stations()
+    _require_shown(params, context.unit.sample_rate_hz)
+    require_possible("amplitudes_deg", params.amplitudes_deg, stations, context.bench)
+    duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1]) + program.beyond_stations_s()
     if context.unit.gyro is None:
         return Prediction(duration_s, (), ("the noise of the gyro triad is not known: nothing is predicted",))
     linearity = params.linearity_ppm * units.PPM
@@ -150,8 +157,8 @@ def predict(params: Params, context: Context) -> Prediction:
     basis = (
         f"noise of the unit's record and an encoder of {params.encoder_sd_arcsec:g} arcsec read "
         f"{params.encoder_rate_hz:g} times a second, each reading taken within ±{1e3 * within_s:g} ms, alike for all; "
-        f"a unit without a lag would be told to have a bandwidth above "
-        f"{least:.3g} Hz; stamps that scatter from recording to recording are not predicted"
+        f"of a unit without a lag the result would be a bandwidth above {least:.3g} Hz; "
+        "stamps that scatter from recording to recording are not predicted"
     )
     return Prediction(duration_s, tuple(found), (), basis)
 
@@ -198,20 +205,12 @@ def _program(params: Params) -> ResponseProgram:
     )
 
 
-def _require_possible(params: Params, context: Context) -> None:
-    """Refuse sinusoids that the table cannot follow or the samples cannot show, before anything moves."""
-    bench: BenchDescription = context.bench
-    most_hz = HIGHEST_SHARE * context.unit.sample_rate_hz
+def _require_shown(params: Params, sample_rate_hz: float) -> None:
+    """Refuse frequencies that the unit's samples cannot show."""
+    most_hz = HIGHEST_SHARE * sample_rate_hz
     if params.frequencies_hz[-1] > most_hz:
-        allowed = (
-            f"at most {most_hz:g} Hz, {HIGHEST_SHARE:g} of the unit's sample rate of {context.unit.sample_rate_hz:g} Hz"
-        )
+        allowed = f"at most {most_hz:g} Hz, {HIGHEST_SHARE:g} of the unit's sample rate of {sample_rate_hz:g} Hz"
         raise BadParameter("frequencies_hz", params.frequencies_hz[-1], allowed)
-    for station in schedule(params):
-        if station.angles is None or station.sinusoid is None:
-            continue
-        if found := bench.sinusoid_violations(station.angles, station.sinusoid):
-            raise BadParameter("amplitudes_deg", params.amplitudes_deg, f"station {station.label}: {'; '.join(found)}")
 
 
 DELAY, BANDWIDTH = "gyro {} delay", "gyro {} bandwidth"

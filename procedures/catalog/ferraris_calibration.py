@@ -6,7 +6,6 @@ sums of the turns give b, the differences of the turns K, without the Earth's ra
 """
 
 from collections.abc import AsyncIterator, Sequence
-from math import ceil
 
 import numpy as np
 from pydantic import Field
@@ -26,15 +25,11 @@ from procedures.core.errors import BadParameter
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.limits import Limit, PlannedCheck
 from procedures.core.recording import AXES, Recording, Station
-from procedures.core.turn import PEAK_ACCELERATION
 from procedures.ferraris import FerrarisLimits, Result
 from procedures.multi_position import predicted
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.site_parameters import TableParameters, declared_table
-from procedures.turn_rests import require_rest, rest_with_demands
-
-ACCELERATION_SHARE = 0.9
-"""Share of the outer axis' acceleration for ramps without a given length; the rest is for the servo."""
+from procedures.table_motion import default_ramp_s, require_possible, require_rest, rest_with_demands
 
 
 class Params(TableParameters):
@@ -53,10 +48,9 @@ class Params(TableParameters):
 
 def resolve(params: Params, context: Context) -> Params:
     """Rest from the unit; ramps, site and table accuracy from the bench."""
-    outer = context.bench.outer
-    ramp_s = PEAK_ACCELERATION * params.rate_deg_s / (ACCELERATION_SHARE * outer.acceleration_deg_s2)
+    ramp_s = default_ramp_s(params.rate_deg_s, context.bench)
     end_rest_s = rest_with_demands(END_REST_S, context.bench)
-    own = {"rest_s": context.unit.averaging_time_s, "ramp_s": ceil(10.0 * ramp_s) / 10.0, "end_rest_s": end_rest_s}
+    own = {"rest_s": context.unit.averaging_time_s, "ramp_s": ramp_s, "end_rest_s": end_rest_s}
     full = params.filled({**own, **declared_table(context)})
     full.require_sources(context, corrected=False)
     return full
@@ -78,9 +72,7 @@ def predict(params: Params, context: Context) -> Prediction:
     params = resolve(params, context)
     stations = schedule(params)
     require_rest("end_rest_s", params.end_rest_s, context.bench)
-    for station in stations:
-        if station.angles is not None and (found := context.bench.violations(station.angles, station.turn)):
-            raise BadParameter("rate_deg_s", params.rate_deg_s, f"station {station.label}: {'; '.join(found)}")
+    require_possible("rate_deg_s", params.rate_deg_s, stations, context.bench)
     spans = windows(stations, context.bench.axis_motion)
     still = [s for s in stations if s.turn is None]
     site = params.site(context)

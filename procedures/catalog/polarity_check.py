@@ -5,7 +5,6 @@ tells exchanged, reversed and dead channels before hours are spent on a calibrat
 """
 
 from collections.abc import AsyncIterator, Sequence
-from math import ceil
 
 from pydantic import Field
 
@@ -21,9 +20,9 @@ from procedures.core.errors import BadParameter
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import AXES, TRIADS, Recording, Station
 from procedures.core.report import Report, Table
-from procedures.core.turn import PEAK_ACCELERATION, Turn
+from procedures.core.turn import Turn
 from procedures.procedure import Context, JudgedParameters, Outcome, Parameters, Prediction, Procedure
-from procedures.turn_rests import require_rest, rest_with_demands
+from procedures.table_motion import default_ramp_s, require_possible, require_rest, rest_with_demands
 
 REST_S = 4.0
 """Rest at the end of a recording where the table's demands take no time [s]."""
@@ -60,9 +59,9 @@ class Result(Outcome):
 
 def resolve(params: Params, context: Context) -> Params:
     """Ramp from the outer axis' acceleration, rest from the table's demands: the last half of it is at rest."""
-    ramp_s = PEAK_ACCELERATION * params.rate_deg_s / (ACCELERATION_SHARE * context.bench.outer.acceleration_deg_s2)
+    ramp_s = default_ramp_s(params.rate_deg_s, context.bench, ACCELERATION_SHARE)
     rest_s = rest_with_demands(REST_S, context.bench, turns=2)
-    return params.filled({"ramp_s": ceil(10.0 * ramp_s) / 10.0, "rest_s": rest_s})
+    return params.filled({"ramp_s": ramp_s, "rest_s": rest_s})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -81,9 +80,7 @@ def predict(params: Params, context: Context) -> Prediction:
     params = resolve(params, context)
     stations = schedule(params)
     require_rest("rest_s", params.rest_s, context.bench, turns=2)
-    for station in stations:
-        if station.angles is not None and (found := context.bench.violations(station.angles, station.turn)):
-            raise BadParameter("rate_deg_s", params.rate_deg_s, f"station {station.label}: {'; '.join(found)}")
+    require_possible("rate_deg_s", params.rate_deg_s, stations, context.bench)
     basis = "answers are judged by tenths: noise and uncalibrated scale factors do not count"
     return Prediction(float(windows(stations, context.bench.axis_motion)[-1, 1]), basis=basis)
 

@@ -8,7 +8,6 @@ The outer axis must turn without end. The accelerometers are recorded but not ju
 """
 
 from collections.abc import AsyncIterator, Sequence
-from math import ceil
 from typing import Annotated
 
 from pydantic import Field
@@ -20,7 +19,7 @@ from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.turns.fit import TERMS, Term
 from procedures.analysis.turns.plan import TurnPlan, TurnProgram, bench_time_s, coefficient_names, too_coarse
 from procedures.analysis.turns.summary import WholeTurns, analyse_turns
-from procedures.bench import Bench, BenchDescription
+from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.coefficient_name import CoefficientName
@@ -30,7 +29,6 @@ from procedures.core.limits import Check, Limit, PlannedCheck, check, significan
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.site import Site
-from procedures.core.turn import PEAK_ACCELERATION
 from procedures.procedure import (
     Context,
     JudgedParameters,
@@ -43,14 +41,12 @@ from procedures.procedure import (
 from procedures.reports import whole_turns as pictures
 from procedures.reports.calibration import budget_tables
 from procedures.site_parameters import Arcsec
-from procedures.turn_rests import require_rest, rest_with_demands
+from procedures.table_motion import default_ramp_s, require_possible, require_rest, rest_with_demands
 
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
 TERM_SOURCE = "ours, after thesis 4.3"
 REST_S = 2.0
 """Rest at the end of a recording where the table's demands take no time [s]."""
-ACCELERATION_SHARE = 0.9
-"""Share of the outer axis' acceleration for ramps without a given length; the rest is for the servo."""
 
 
 class Limits(Parameters):
@@ -109,11 +105,10 @@ class Result(Outcome):
 
 def resolve(params: Params, context: Context) -> Params:
     """Ramps, site and table accuracy from the bench; the reference rate from the rates."""
-    site, accuracy, outer = context.bench.site, context.bench.accuracy, context.bench.outer
+    site, accuracy = context.bench.site, context.bench.accuracy
     fastest = max(params.rates_deg_s)
-    ramp_s = PEAK_ACCELERATION * fastest / (ACCELERATION_SHARE * outer.acceleration_deg_s2)
     defaults = {
-        "ramp_s": ceil(10.0 * ramp_s) / 10.0,
+        "ramp_s": default_ramp_s(fastest, context.bench),
         "rest_s": rest_with_demands(REST_S, context.bench),
         "reference_rate_deg_s": fastest,
         "latitude_deg": site.latitude_deg,
@@ -135,7 +130,8 @@ def predict(params: Params, context: Context) -> Prediction:
     Raises `Undetermined` where the rates cannot separate the terms, `BadParameter` where the table cannot turn so.
     """
     params = resolve(params, context)
-    _require_possible(params, context.bench)
+    require_rest("rest_s", params.rest_s, context.bench)
+    require_possible("rates_deg_s", params.rates_deg_s, schedule(params), context.bench)
     plan = _plan(params, context)
     made = plan.estimator()
     duration_s, per_axis_s = bench_time_s(plan)
@@ -223,14 +219,6 @@ def _plan(params: Params, context: Context) -> TurnPlan:
 
 def _site(params: Params, context: Context) -> Site:
     return site_with(context.bench.site, params.latitude_deg, None, params.azimuth_deg, None)
-
-
-def _require_possible(params: Params, bench: BenchDescription) -> None:
-    """Refuse turns that the table cannot make, or not within their recordings, before anything moves."""
-    require_rest("rest_s", params.rest_s, bench)
-    for station in schedule(params):
-        if station.angles is not None and (found := bench.violations(station.angles, station.turn)):
-            raise BadParameter("rates_deg_s", params.rates_deg_s, f"station {station.label}: {'; '.join(found)}")
 
 
 def _warnings(params: Params, plan: TurnPlan) -> tuple[str, ...]:

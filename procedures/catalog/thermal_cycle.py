@@ -26,7 +26,7 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.frames import specific_force_b
+from procedures.core.frames import upward_axis
 from procedures.core.limits import verdict
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
@@ -165,7 +165,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     params = resolve(params, context)
     _require_correction(params, context)
     site = site_with(context.bench.site, None, params.gravity_m_s2, None, None)
-    series = each_watched(run_of, recordings, lambda _, recording: (recording, _up(recording, context)))
+    series = each_watched(run_of, recordings, lambda _, recording: (recording, _up(recording)))
     unit = context.unit
     calibration = unit.calibration("accelerometer")
     known = KnownOfUnit(
@@ -221,14 +221,13 @@ def _limits(params: Params) -> CycleLimits:
     return CycleLimits(**params.limits.model_dump(), level=params.level)
 
 
-def _up(recording: Recording, context: Context) -> int:
+def _up(recording: Recording) -> int:
     """The axis that stood upwards, by the station's attitude."""
     station = recording.info.station
     if station is None or station.angles is None:
         raise UnfitRecording(f"recording {recording.info.id}: the unit's attitude was not recorded")
-    force = specific_force_b([station.angles], context.bench.site)[0]
-    up = int(force.argmax())
-    if force[up] < 0.99 * context.bench.site.gravity_m_s2:
+    up = upward_axis(station.angles)
+    if up is None:
         raise UnfitRecording(f"recording {recording.info.id}: no axis of the unit stood upwards")
     return up
 

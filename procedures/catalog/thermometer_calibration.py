@@ -81,7 +81,10 @@ class Params(JudgedParameters):
         "None: the bench's",
     )
     soak_sd_c: float | None = Field(
-        None, ge=0.0, le=100.0, description="the same, independent at each soak; None: the bench's"
+        None,
+        ge=0.0,
+        le=100.0,
+        description="standard uncertainty of the same difference, independent at each soak; None: the bench's",
     )
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 

@@ -98,7 +98,7 @@ class Result(Outcome):
 
     triads: tuple[TriadVerification, ...]
     dwells: DwellsSaved | None = Field(
-        None, exclude_if=lambda saved: saved is None, description="of a stop rule: each dwell, and the time saved"
+        None, exclude_if=lambda saved: saved is None, description="dwells ended by the stop rule, and the time saved"
     )
 
 

@@ -47,6 +47,17 @@ def specific_force_b(angles: list[TableAngles], site: Site) -> Array:
     return np.array([table_rotation(a).inv().apply(up_r) for a in angles]).reshape(-1, 3)
 
 
+LEVEL_SHARE = 0.99
+"""Least share of gravity along an axis that counts as upwards: it stands within 8°."""
+
+
+def upward_axis(angles: TableAngles) -> int | None:
+    """Index of the unit's axis that stands upwards, 0 … 2; None where none has `LEVEL_SHARE` of gravity along it."""
+    up_b = table_rotation(angles).inv().apply(np.array([0.0, 1.0, 0.0]))
+    upmost = int(np.argmax(up_b))
+    return upmost if up_b[upmost] >= LEVEL_SHARE else None
+
+
 def earth_rate_b(angles: list[TableAngles], site: Site) -> Array:
     """Earth's angular velocity in the unit's axes, shape (n, 3) [rad/s].
 

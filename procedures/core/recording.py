@@ -39,8 +39,11 @@ class Quantity(StrEnum):
     ANGULAR_RATE = "angular_rate"
     SPECIFIC_FORCE = "specific_force"
     TEMPERATURE = "temperature"
+    """Temperature of a sensor of the unit or of the chamber's air."""
     TABLE_ANGLE = "table_angle"
+    """Angle of one axis of the table, by its encoder."""
     TIME = "time"
+    """Age of the table's reading at the end of a sample's interval, or half the interval in which it was taken."""
 
 
 INCREMENTS = (Quantity.ANGLE_INCREMENT, Quantity.VELOCITY_INCREMENT)
@@ -55,7 +58,8 @@ UNITS: dict[Quantity, tuple[str, ...]] = {
 }
 """Permitted units of a channel of each quantity; "count" marks a scale that is not known yet."""
 AROUND = (Quantity.TEMPERATURE, Quantity.TABLE_ANGLE, Quantity.TIME)
-"""Quantities around the unit or beside its triads: no inertial channel has one."""
+"""Quantities of channels that are recorded with the triads and belong to neither: temperatures of unit and chamber,
+angles of the table, and the ages of its readings."""
 
 
 @dataclass(frozen=True)

@@ -48,18 +48,23 @@ class Params(Parameters):
     case_reference_c: float = Field(20.0, ge=-100.0, le=200.0, description="where the correction does nothing")
     converter_reference_c: float = Field(20.0, ge=-100.0, le=200.0)
     case_range_c: Range | None = Field(None, description="readings at which they were found; both ranges or none")
-    converter_range_c: Range | None = Field(None, description="of none, no use can say that it extrapolates")
+    converter_range_c: Range | None = Field(
+        None, description="[°C]; without ranges no use of the correction can warn that it extrapolates"
+    )
     form: Form = Form.BOTH
 
     @model_validator(mode="after")
-    def _both_ranges(self) -> Self:
+    def _ranges(self) -> Self:
         if (self.case_range_c is None) != (self.converter_range_c is None):
             raise ValueError("case_range_c and converter_range_c: both or none")
+        for name, span in (("case_range_c", self.case_range_c), ("converter_range_c", self.converter_range_c)):
+            if span is not None and not span[0] <= span[1]:
+                raise ValueError(f"{name} = {span[0]:g}, {span[1]:g}: the lower temperature first")
         return self
 
     @property
     def fitted_range(self) -> TemperatureRange | None:
-        """The range of both sensors, where it is known. Raises `BadParameter` where it ends before it begins."""
+        """The range of both sensors, where it is known."""
         if self.case_range_c is None or self.converter_range_c is None:
             return None
         return TemperatureRange(self.case_range_c, self.converter_range_c)

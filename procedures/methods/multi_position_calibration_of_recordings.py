@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from procedures import multi_position
-from procedures.analysis.calibration.reference_temperature import require_correctable
+from procedures.analysis.calibration.reference_temperature import LEAST_DWELL_S, require_correctable
 from procedures.analysis.calibration.table_errors import TableUncertainty, direction_errors
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -58,7 +58,7 @@ class Params(FitParameters, RecordedParameters):
         "none", description="current: the unit's corrections bring both triads to their reference temperatures"
     )
     case_lag_s: Lag = Field(5.0, description="time constant of the case sensor; used by thermal_correction=current")
-    converter_lag_s: Lag = Field(5.0, description="the same of the converter's sensor")
+    converter_lag_s: Lag = Field(5.0, description="time constant of the converter's sensor")
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
@@ -72,8 +72,15 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     if params.thermal_correction == "none":
         return multi_position.calibrated(evidence.recordings, params, inputs, unit)
     if unit is None or "accelerometer" not in params.triads:
-        raise BadParameter("thermal_correction", "current", "none, without the accelerometers of a unit")
-    require_correctable("current", min(r.info.duration_s for r in evidence.recordings), unit)
+        way_out = "none: it needs the recordings' unit, and accelerometer among the triads"
+        raise BadParameter("thermal_correction", "current", way_out)
+    require_correctable("current", None, unit)
+    shortest = min(evidence.recordings, key=lambda r: r.info.duration_s).info
+    if shortest.duration_s < LEAST_DWELL_S:
+        raise UnfitRecording(
+            f"recording {shortest.id} lasts {shortest.duration_s:g} s: thermal_correction=current needs at least "
+            f"{LEAST_DWELL_S:g} s, in which the temperatures are read too"
+        )
     lags = params.case_lag_s, params.converter_lag_s
     return multi_position.calibrated(evidence.recordings, params, inputs, unit, lags)
 

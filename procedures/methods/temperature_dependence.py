@@ -35,6 +35,7 @@ from procedures.core.limits import significance, verdict
 from procedures.core.recording import AROUND, GYRO, Quantity, Recording, RecordingInfo
 from procedures.core.report import Report
 from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
@@ -48,7 +49,7 @@ class Params(RecordedParameters):
     """Channels, sensors and how they are judged."""
 
     channels: tuple[str, ...] | None = Field(
-        None, min_length=1, max_length=64, description="None: all except temperatures"
+        None, min_length=1, max_length=64, description="None: all of gyros and accelerometers"
     )
     sensor: str | None = Field(None, description="temperature channel; None: the only one that the recordings have")
     own_sensors: dict[str, str] = Field(
@@ -115,7 +116,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     sensors = {name: _sensor(recordings, name, params) for name in names}
     known = unit.thermometers if unit is not None and params.thermometers else None
     applied = known is not None and any(known.has(sensor) for sensor in sensors.values())
-    series = [_series(recording, sensors, params, unit) for recording in recordings]
+    series = [_series(recording, sensors, params, known) for recording in recordings]
     found = [_channel(recordings[0].info, name, sensors[name], [s[name] for s in series], params) for name in names]
     level, source = params.level / len(names), "ours: no dependence on temperature"
     name = "independence of temperature, p-value"
@@ -129,7 +130,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
         reference_c=params.reference_c,
         range_c=(float(min(t.min() for t in temperatures)), float(max(t.max() for t in temperatures))),
         thermometers=(unit.thermometers_id or "") if unit is not None and applied else "",
-        gyro_correction=_gyros([c for c, _ in found], temperatures, params, unit),
+        gyro_correction=_gyros([c for c, _ in found], temperatures, params, known),
         trace_c=tuple(tuple((s.departure_c + params.reference_c).tolist()) for s in found[0][1]),
     )
 
@@ -196,11 +197,12 @@ def _spread(values: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([(v - v.mean()) ** 2 for v in values]))))
 
 
-def _series(recording: Recording, sensors: Mapping[str, str], params: Params, unit: Unit | None) -> dict[str, Series]:
+def _series(
+    recording: Recording, sensors: Mapping[str, str], params: Params, known: ThermometerCorrection | None
+) -> dict[str, Series]:
     """Cells of each channel and of its temperature sensor, with the regime where soaks are asked for; read once."""
     of_sensors = tuple(dict.fromkeys(sensors.values()))
     cells = cell_means(recording, (*sensors, *of_sensors), SECOND_S)
-    known = unit.thermometers if unit is not None and params.thermometers else None
     size = max(1, round(params.cell_s / cells.cell_s))
     count = cells.rates.shape[1] // size
     if count < FEWEST:
@@ -218,7 +220,7 @@ def _series(recording: Recording, sensors: Mapping[str, str], params: Params, un
         if params.soaks:
             trace = regimes(temperature, cells.cell_s, RegimeSettings(**params.regime.model_dump()))
             dynamic[sensor] = np.logical_or.reduce(trace.dynamic[: count * size].reshape(count, size), axis=1)
-    rows = zip(sensors.items(), cells.rates, strict=False)  # the sensors' own rows come after
+    rows = zip(sensors.items(), cells.rates[: len(sensors)], strict=True)
     return {
         name: Series(_cells(values, count, size), departures[sensor], dynamic.get(sensor))
         for (name, sensor), values in rows
@@ -230,7 +232,7 @@ def _cells(values: Array, count: int, size: int) -> Array:
 
 
 def _gyros(
-    found: Sequence[ChannelFound], temperatures: Sequence[Array], params: Params, unit: Unit | None
+    found: Sequence[ChannelFound], temperatures: Sequence[Array], params: Params, known: ThermometerCorrection | None
 ) -> GyroThermalCorrection | None:
     """Correction of a gyro triad in rad/s, each by its own sensor; None where that is not what was fitted."""
     of = {c.channel: c for c in found}
@@ -242,7 +244,6 @@ def _gyros(
         for n in GYRO
     )
     span = (float(min(t.min() for t in temperatures)), float(max(t.max() for t in temperatures)))
-    known = unit.thermometers if unit is not None and params.thermometers else None
     return GyroThermalCorrection((x, y, z), params.reference_c, span, known)
 
 

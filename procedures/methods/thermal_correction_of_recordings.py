@@ -23,11 +23,10 @@ from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_la
 from procedures.core.arrays import Array
 from procedures.core.converter import at_reference
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.frames import specific_force_b
+from procedures.core.frames import upward_axis
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import ACCELEROMETER, AXES, Quantity, Recording
+from procedures.core.recording import ACCELEROMETER, AXES, Recording
 from procedures.core.report import Report, Table
-from procedures.core.site import Site
 from procedures.core.thermal_correction import COEFFICIENTS, Form, ThermalCorrection
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
@@ -38,8 +37,6 @@ from procedures.thermal_parameters import Regime
 SECOND_S = 1.0
 ORDER = 2
 """Order of the polynomials of thesis 4.1; the others are compared with it."""
-LEVEL_SHARE = 0.99
-"""Least share of gravity along the axis that a station's angles have upwards."""
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
 
 
@@ -49,22 +46,25 @@ class Params(RecordedParameters):
     up: tuple[Literal["x", "y", "z"], ...] | None = Field(
         None, min_length=1, max_length=100, description="axis upwards, one a recording; None: by the stations' angles"
     )
-    gravity_m_s2: float = Field(ge=9.7, le=9.9, description="where they were recorded")
+    gravity_m_s2: float = Field(ge=9.7, le=9.9, description="gravity where they were recorded")
     case_sensor: str = Field("temperature_case", description="channel that stands for the unit's temperature_case")
     converter_sensor: str | None = Field(
-        "temperature_converter", description="the same of temperature_converter; None: one sensor explains all"
+        "temperature_converter",
+        description="channel that stands for the unit's temperature_converter; None: one sensor explains all",
     )
     case_lag_s: Lag = Field(5.0, description="time constant of the sensor, by its data sheet")
     converter_lag_s: Lag = 5.0
     lag_sd_s: Lag = Field(0.05, description="standard uncertainty of each time constant")
     thermometers: bool = Field(True, description="correct sensors by the unit's current calibration of thermometers")
     converter: bool = Field(True, description="take out the unit's current models of its converter first (stage one)")
-    reference_case_c: float = Field(20.0, ge=-100.0, le=200.0, description="where the correction does nothing")
+    reference_case_c: float = Field(
+        20.0, ge=-100.0, le=200.0, description="reading at which the correction does nothing"
+    )
     reference_converter_c: float = Field(20.0, ge=-100.0, le=200.0)
     cell_s: float = Field(60.0, ge=1.0, le=600.0, description="cells that the fits work on")
     regime: Regime = Field(default_factory=lambda: Regime.model_validate({}))
     three_sigma_m_s2: float = Field(
-        0.0005, gt=0.0, le=100.0, description="of each axis' residuals at soaks, in sample (thesis 4.3)"
+        0.0005, gt=0.0, le=100.0, description="largest 3σ of each axis' residuals at soaks, in sample (thesis 4.3)"
     )
 
 
@@ -115,8 +115,9 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     form = Form.SINGLE if len(sensors) == 1 else Form.BOTH
     reference = params.reference_case_c, params.reference_converter_c if len(sensors) == 2 else params.reference_case_c
     calibration = None if unit is None else unit.calibration("accelerometer")
-    uncalibrated = calibration is None or calibration.output_unit != "m/s^2"
-    if calibration is not None and not uncalibrated:
+    if calibration is not None and calibration.output_unit != "m/s^2":
+        calibration = None
+    if calibration is not None:
         runs = felt_forces(runs, reference, calibration, form)
     lag_sds = (0.0, params.lag_sd_s) if form is Form.SINGLE else (params.lag_sd_s, params.lag_sd_s)
     found, fits = fit_correction(runs, reference, form, lag_sds)
@@ -128,7 +129,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     return Result(
         checks=checks,
         verdict=verdict(checks),
-        warnings=_warnings(axes, runs, uncalibrated, stage is None, len(sensors)),
+        warnings=_warnings(axes, runs, calibration is not None, stage is None, len(sensors)),
         correction=correction,
         axes=axes,
         sensors=sensors,
@@ -192,10 +193,13 @@ def _by_angles(recording: Recording) -> int:
     station = recording.info.station
     if station is None or station.angles is None:
         raise BadParameter("up", None, f"x, y or z for each: recording {recording.info.id} has no angles of its own")
-    share = specific_force_b([station.angles], Site(latitude_deg=0.0, gravity_m_s2=1.0))[0]
-    if share.max() < LEVEL_SHARE:
-        raise UnfitRecording(f"recording {recording.info.id}: no axis of the unit stood upwards")
-    return int(share.argmax())
+    up = upward_axis(station.angles)
+    if up is None:
+        raise UnfitRecording(
+            f"recording {recording.info.id}: no axis of the unit stood upwards by its station's angles; give the axes "
+            "by `up` where the angles are wrong"
+        )
+    return up
 
 
 def _as_wanted(unit: Unit | None, params: Params, sensors: Sequence[str]) -> Unit | None:
@@ -211,15 +215,9 @@ def _as_wanted(unit: Unit | None, params: Params, sensors: Sequence[str]) -> Uni
 def _run(recording: Recording, up: int, sensors: Sequence[str], params: Params, unit: Unit | None) -> ThermalRun:
     """Cells of one recording, which is read once. Raises `MissingChannel`, `UnfitRecording`."""
     info = recording.info
-    for name, unit_of, quantity in (
-        *((name, "m/s^2", Quantity.SPECIFIC_FORCE) for name in ACCELEROMETER),
-        *((name, "degC", Quantity.TEMPERATURE) for name in sensors),
-    ):
-        channel = info.channels[info.column(name)]
-        if channel.rate_unit != unit_of:
-            raise UnfitRecording(
-                f"recording {info.id}: {name} is in {channel.rate_unit}, {quantity.value} in {unit_of}"
-            )
+    for name, wanted in {**dict.fromkeys(ACCELEROMETER, "m/s^2"), **dict.fromkeys(sensors, "degC")}.items():
+        if (found := info.channels[info.column(name)].rate_unit) != wanted:
+            raise UnfitRecording(f"recording {info.id}: {name} is in {found}, the correction needs it in {wanted}")
     cells = cell_means(recording, (*ACCELEROMETER, *sensors), SECOND_S)
     output, readings = cells.rates[:3].T, cells.rates[3:]
     if unit is not None and unit.thermometers is not None:
@@ -265,12 +263,12 @@ def _check(one: AxisResult, limit: float) -> Check:
 
 
 def _warnings(
-    axes: Sequence[AxisResult], runs: Sequence[ThermalRun], uncalibrated: bool, unstaged: bool, sensors: int
+    axes: Sequence[AxisResult], runs: Sequence[ThermalRun], calibrated: bool, unstaged: bool, sensors: int
 ) -> tuple[str, ...]:
     told = [f"accelerometer {a.axis}: {a.reason}" for a in axes if a.preferred_order > ORDER]
     if len(runs) == len(AXES):
         told.append("each axis stood up in one recording: nothing shows how well the correction repeats")
-    if uncalibrated:
+    if not calibrated:
         told.append(
             "the unit has no calibration of its accelerometers in m/s²: forces were taken as those of an ideal, level "
             "seat; a horizontal axis that feels some gravity then mixes its scale's drift into its bias"

@@ -16,7 +16,7 @@ BLOCK_TICKS = 1000
 
 
 class SimCurrentSource:
-    """Gives ``I·(1 + gain error) + zero error + noise``, the noise again each tick."""
+    """Gives ``I·(1 + gain error) + zero error + noise``, the noise independent at each tick."""
 
     def __init__(
         self, truth: CurrentSourceTruth, limits: CurrentSourceLimits, seed: int, now_s: Callable[[], float]

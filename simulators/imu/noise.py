@@ -231,9 +231,9 @@ class TriadNoise:
 class DitherResidue:
     """Residue of the mechanical dither after the notch filter: ``A·sin(2πft + φ)`` on each channel's integrated output.
 
-    φ is drawn again for each launch. Seen at the ticks only, so a frequency above half the sample rate shows itself
-    where it folds to. An increment is ``2A·sin(πf/r)·cos(2πf(k + ½)/r + φ)`` (tick k, rate r); within a block it is a
-    table of cosines and sines turned by the phase at the block's beginning.
+    φ is drawn independently for each launch. Seen at the ticks only, so a frequency above half the sample rate shows
+    itself where it folds to. An increment is ``2A·sin(πf/r)·cos(2πf(k + ½)/r + φ)`` (tick k, rate r); within a block it
+    is a table of cosines and sines turned by the phase at the block's beginning.
     """
 
     def __init__(self, truth: TriadTruth, rate_hz: float, block_ticks: int, key: tuple[int, int, str]) -> None:

@@ -50,7 +50,7 @@ class TableTruth:
     azimuth_error_arcsec: float = 0.0
     """True heading of x at zero angles minus the declared azimuth, clockwise from north."""
     pointing_sd_arcsec: float = 0.0
-    """Standard deviation by which each axis stops off its encoder's reading, drawn again at each move."""
+    """Standard deviation by which each axis stops off its encoder's reading, drawn independently at each move."""
     outer_wobble_arcsec: float = 0.0
     """The axis sways in its bearing by amplitude·sin(angle): outer about z, middle about x, inner about y."""
     middle_wobble_arcsec: float = 0.0
@@ -77,7 +77,7 @@ class OperatorTruth:
     """Accuracy and speed of the person at the bench who sets the unit by hand. Ours."""
 
     fixture_tilt_sd_arcsec: float = 300.0
-    """Standard deviation of the unit's lean about each axis of its seat, a manual table, drawn again each time."""
+    """Standard deviation of the unit's lean about each axis of its seat, a manual table; independent each time."""
     set_by_hand_s: float = 300.0
     """Bench time from the door's opening to its closing; the unit is set halfway."""
 

@@ -115,7 +115,7 @@ def test_every_entry_has_a_schema_that_a_client_can_read(entry) -> None:
 
 
 def test_only_one_file_reads_the_wall_clock_or_makes_chance() -> None:
-    """What imports cannot show, ruff can; here, that its rule is switched off for no other file than the one."""
+    """Ruff checks what imports cannot show; its rule is switched off for no other file than the one."""
     allowed = {"bench_service/wall_clock.py", "bench_service/bench/session.py"}
     with_exception = {str(p.relative_to(ROOT)) for p in SOURCES if "noqa: TID251" in p.read_text()}
     assert with_exception <= allowed, (

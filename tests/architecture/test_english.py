@@ -10,6 +10,7 @@ from tests.kit.page_texts import of_scripts, of_templates
 
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 HEADLESS = ("What ", "Who ", "Whoever ", "Whose ", "Of ")
+HEADLESS_DOCSTRING = re.compile(rf'(?:\A|:(?:  #.*)?\n)\s*"""((?:{"|".join(HEADLESS)}).*)')
 LEAST_WORDS = 4
 MOST_SHORT = 10
 """Summaries that may have fewer words; each is one more than none, and a new one pushes an old one out."""
@@ -43,6 +44,18 @@ def test_summaries_begin_with_a_noun_or_a_verb_and_have_four_words() -> None:
     assert headless == []
     short = [f"{place}: {text}" for place, text in summaries if len(text.split()) < LEAST_WORDS]
     assert len(short) <= MOST_SHORT, f"name the thing or the verb in four words at least: {short}"
+
+
+def test_docstrings_of_tests_and_client_begin_so_too() -> None:
+    """By text: to parse six hundred files more takes four seconds."""
+    paths = sorted(path for folder in ("tests", "client/bench_client") for path in (ROOT / folder).rglob("*.py"))
+    assert len(paths) > 400
+    headless = {
+        f"{path.relative_to(ROOT)}: {found[1]}"
+        for path in paths
+        for found in HEADLESS_DOCSTRING.finditer(path.read_text(encoding="utf-8"))
+    }
+    assert headless == set()
 
 
 def test_no_class_or_function_has_a_poetic_name() -> None:

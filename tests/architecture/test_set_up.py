@@ -1,4 +1,4 @@
-"""What the set-up says when it cannot go on, and what it installs."""
+"""Messages of the set-up when it cannot go on, and what it installs."""
 
 import importlib.util
 import re

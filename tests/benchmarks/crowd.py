@@ -17,7 +17,7 @@ LINE = b'data: {"sequence"'
 
 @dataclass
 class Ear:
-    """What one listener has heard, in order, and how late [s] where he was already there, or on his way."""
+    """Events that one listener has heard, in order, and how late [s] where he was already there, or on his way."""
 
     sequences: list[int] = field(default_factory=list[int])
     delays_s: list[float] = field(default_factory=list[float])

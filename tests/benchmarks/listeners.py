@@ -52,7 +52,7 @@ class Round:
 
 @contextmanager
 def on_core(number: int) -> Generator[bool]:
-    """What is started in the block runs on one of this process's cores; False: there are not two, so on all of them."""
+    """Processes started in the block run on one of our cores; False: there are not two, so they run on all of them."""
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_setaffinity") else []
     if len(cores) < 2:
         yield False
@@ -100,7 +100,7 @@ def _processor_s(process: psutil.Process) -> float:
 
 
 def _loop_s(process: psutil.Process) -> float:
-    """Of the main thread, which uvicorn runs in."""
+    """Processor time of the main thread, which uvicorn runs in [s]."""
     return next(thread.user_time + thread.system_time for thread in process.threads() if thread.id == process.pid)
 
 
@@ -112,7 +112,7 @@ def more(alone: list[float], listened: list[float]) -> tuple[float, float, float
 
 
 def judged(low: float, high: float) -> str:
-    """What an interval says about the limit."""
+    """Verdict of an interval about the limit."""
     if high <= MOST:
         return f"at most {MOST:.0%}: kept"
     return f"at most {MOST:.0%}: missed" if low > MOST else f"at most {MOST:.0%}: not decided on a machine so busy"

@@ -59,7 +59,7 @@ class Row:
 
 
 def addresses(client: httpx.Client, real: str, begin_ms: int, jobs: int) -> dict[str, str]:
-    """What is asked for, by its name: of the middle of the history, and of the `real` job that was multiplied."""
+    """Addresses to ask for, by name: of the middle of the history, and of the `real` job that was multiplied."""
     result = client.get(f"/api/v1/jobs/{real}").json()["result"]
     middle = client.get("/api/v1/jobs", params={"limit": 500}).json()["items"][-1]
     begin = begin_ms / 1000 + jobs * STEP_MS / 2000

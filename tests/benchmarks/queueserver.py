@@ -43,7 +43,7 @@ class NotRun(Exception):
 
 
 def quietly(arguments: list[str], seconds: float) -> str:
-    """What a command prints; nothing that it started outlives it. Raises `NotRun` with the end of its complaint."""
+    """Output of a command; nothing that it started outlives it. Raises `NotRun` with the end of its complaint."""
     pipe = subprocess.PIPE
     process = subprocess.Popen(arguments, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
     try:

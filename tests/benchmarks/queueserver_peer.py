@@ -124,7 +124,7 @@ def measured(folder: Path, jobs: int, redis: int, control: int, info: int) -> di
 
 
 def warm(manager: Manager, jobs: int) -> dict[str, float]:
-    """What is measured once the first plan has run: [ms], [jobs/s]."""
+    """Figures measured once the first plan has run: [ms], [jobs/s]."""
     in_a_row = [manager.one() for _ in range(jobs)]
     at_any_moment = []
     for number in range(jobs):

@@ -40,7 +40,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the product said."""
+    """Answer that the product gave."""
 
     verdict: str
     """A verdict, or "refused"."""

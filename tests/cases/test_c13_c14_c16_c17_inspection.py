@@ -20,7 +20,7 @@ INCREMENTS = (
 
 
 def ask(method: str, samples: np.ndarray, rate_hz: float, channels: tuple[Channel, ...], **parameters: Any) -> Outcome:
-    """What a method says of one recording, by the way that the service takes."""
+    """Answer of a method about one recording, by the way that the service takes."""
     entry = discover()[method]
     recording = MemoryRecording(RecordingInfo("r", "U", channels, rate_hz, len(samples)), samples)
     return analyse_method(entry, Evidence((recording,)), entry.params(**parameters), None)

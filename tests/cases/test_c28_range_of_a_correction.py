@@ -59,7 +59,7 @@ def test_within_its_range_it_corrects_in_silence_and_beyond_it_warns(seed: int) 
     recordings = at(celsius, reference, rng)
     brought = bring_to_reference(recordings, station_means(recordings, "accelerometer"), correction, (0.0, 0.0))
     wrong = float(np.abs(brought.means.outputs - np.vstack([np.eye(3), -np.eye(3)]) * 9.81).max())
-    said = [w for w in thermal_warnings(brought, correction) if "beyond the range" in w]
+    said = [w for w in thermal_warnings(brought) if "beyond the range" in w]
     outside = max(low - celsius, celsius - high)
     if outside > 1.1:
         assert len(said) == 1
@@ -96,7 +96,7 @@ def test_an_older_correction_without_a_range_says_so() -> None:
     recordings = at(30.0, 20.0, rng)
     read = SEEN.validate_python(older)
     brought = bring_to_reference(recordings, station_means(recordings, "accelerometer"), read, (0.0, 0.0))
-    assert any("does not say at which temperatures" in w for w in thermal_warnings(brought, read))
+    assert any("does not say at which temperatures" in w for w in thermal_warnings(brought))
 
 
 @pytest.mark.parametrize("pair", [(40.0, 0.0), (float("nan"), 1.0)])

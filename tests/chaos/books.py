@@ -81,7 +81,7 @@ def twin_key(procedure: str, parameters: Mapping[str, Any], seed: int) -> str:
 
 
 def promised(rows: Mapping[str, Row], asked: Iterable[Asked], bad_end: Callable[[Row, Asked], str]) -> list[str]:
-    """What was acknowledged: each is there, once, under the one id that was said, and ended as it may."""
+    """Acknowledged jobs: each is there, once, under the one id that was said, and ended as it may."""
     wrong: list[str] = []
     by_label = Counter(row["labels"].get("chaos") for row in rows.values())
     for one in asked:
@@ -107,7 +107,7 @@ def acknowledged(books: Books, jobs: Iterable[Asked], stops: Iterable[Stop]) -> 
 
 
 def bad_end(row: Row, cancel_asked: bool, stops: Iterable[Stop]) -> str:
-    """What is wrong with a job's end; empty: nothing."""
+    """Fault of a job's end; empty: there is none."""
     state, failure = row["state"], row["failure"] or {}
     if state == "succeeded":
         return "" if row["verdict"] in ("pass", "fail") and row["result_id"] else f"no verdict or result: {row}"
@@ -235,7 +235,7 @@ def samples(books: Books) -> list[str]:
 
 
 def lost(books: Books, seen: Seen) -> list[str]:
-    """What was once read as committed, and is not there any more, or not the same."""
+    """Rows that were once read as committed, and are missing now or changed."""
     complete = {row["id"]: row["content_hash"] for row in books.recordings if row["state"] == "complete"}
     wrong = [
         f"recording {recording} was sealed, and is lost or changed"
@@ -260,7 +260,7 @@ def lost(books: Books, seen: Seen) -> list[str]:
 
 
 def streams(books: Books, listeners: Iterable[Listener]) -> list[str]:
-    """What listeners heard, across every lost connection, is the table: no event missed, none twice, none changed."""
+    """Events that listeners heard, across lost connections, against the table: none missed, doubled or changed."""
     wrong: list[str] = []
     for listener in listeners:
         table = [(event["sequence"], event["kind"], event["data"]) for event in books.events.get(listener.job, [])]

@@ -56,7 +56,7 @@ SURE = 2
 
 @dataclass(frozen=True)
 class Disaster:
-    """What happens to which bench: after a while, at a chosen moment, with a pause before the return."""
+    """Disaster that happens to a bench: after a while, at a chosen moment, with a pause before the return."""
 
     kind: str
     bench: str
@@ -94,7 +94,7 @@ def disasters(seed: int, topology: Topology, restarts: bool) -> list[Disaster]:
 
 @dataclass
 class Run:
-    """What happened, for the checker."""
+    """Record of a run, for the checker."""
 
     folder: Path
     topology: Topology

@@ -60,7 +60,7 @@ def masters(bench: str, entries: Iterable[dict[str, Any]], ledger: Ledger) -> li
 
 
 def struck(run: Run) -> Iterator[str]:
-    """What broke of itself on the benches, by the failures that the journals have."""
+    """Faults of the benches' devices, by the failures that the journals have."""
     for bench in run.topology.benches:
         for entry in journal(run.folder, bench):
             error = entry["arguments"].get("error", "")
@@ -83,7 +83,7 @@ class Rescue:
 
 
 def rescues(run: Run) -> list[Rescue]:
-    """Of each killed worker that left its bench unsafe."""
+    """Rescue after each killed worker that left its bench unsafe."""
     found: list[Rescue] = []
     for bench, worker in run.topology.workers.items():
         for death in run.topology.ledger.deaths:

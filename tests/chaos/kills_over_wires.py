@@ -11,10 +11,8 @@ from pathlib import Path
 
 from tests.benchmarks.process import free_port
 from tests.chaos.databases import database
+from tests.chaos.journals import NOTICE_LIMIT_S
 from tests.kit.killed_on_wires import DEMANDS, killed_in
-
-MOST_S = 2.0
-"""Longest time from the supervisor's notice to safe by read-back."""
 
 
 def main() -> int:
@@ -28,14 +26,15 @@ def main() -> int:
     for store in ("sqlite", "postgres") if given.database == "both" else (given.database,):
         for kind in given.kind or tuple(DEMANDS):
             for _ in range(given.runs):
-                with tempfile.TemporaryDirectory(prefix="kill-") as folder, database(store, Path(folder)) as server:
-                    found = killed_in(kind, server.url, Path(folder), free_port())
-                told = (
-                    f"{kind} on {store}: kill to safe {found.to_safe_s:.3f} s, notice to safe {found.noticed_s:.3f} s"
-                )
-                print(f"{told}, {found.world}", flush=True)
-                if not (found.world.safe and found.noticed_s < MOST_S):
-                    late.append(told)
+                with (
+                    tempfile.TemporaryDirectory(prefix="kill-") as folder,
+                    database(store, Path(folder)) as server,
+                    killed_in(kind, server.url, Path(folder), free_port()) as found,
+                ):
+                    line = f"{kind} on {store}: {found}"
+                print(line, flush=True)
+                if not (found.world.safe and found.noticed_s < NOTICE_LIMIT_S):
+                    late.append(line)
     print(*(f"NOT KEPT: {each}" for each in late) if late else ["every bench was safe in time"], sep="\n")
     return 1 if late else 0
 

@@ -164,7 +164,7 @@ class Clients(Thread):
             self._release()
 
     def see_through(self, asked: Asked) -> str:
-        """What all others are asked for by the thread, of one job alone, before it is started; its state now."""
+        """Requests that the thread makes for all others, of one job alone, before it is started; its state now."""
         self._follow(asked)
         self._release()
         return asked.state

@@ -38,7 +38,7 @@ class Death:
 
 @dataclass
 class Ledger:
-    """Who was started and who died in a run."""
+    """Processes that were started and that died in a run."""
 
     run: str = field(default_factory=lambda: uuid4().hex)
     births: dict[int, tuple[str, float]] = field(default_factory=dict)
@@ -101,7 +101,7 @@ class Program:
 
     @property
     def pid(self) -> int:
-        """Of the process that was started last; 0 before the first."""
+        """Id of the process that was started last; 0 before the first."""
         return 0 if self._process is None else self._process.pid
 
     @property

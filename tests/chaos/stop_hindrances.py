@@ -1,4 +1,4 @@
-"""What stands in a stop's way, put there while the table moves and taken away after the press."""
+"""Hindrances of a stop, put there while the table moves and taken away after the press."""
 
 import errno
 import os
@@ -182,7 +182,7 @@ def recording_of(http: httpx.Client, count: int = ROWS) -> str:
 
 
 def few_descriptors() -> None:
-    """What `ulimit -n 1024` does."""
+    """Limit of descriptors, as `ulimit -n 1024` sets it."""
     resource.setrlimit(resource.RLIMIT_NOFILE, (DESCRIPTORS, DESCRIPTORS))
 
 

@@ -24,7 +24,7 @@ SOON_S, KILLED_S = 2.0, 5.0
 
 @dataclass(frozen=True)
 class Hindrance:
-    """What stands in the way, and how long a stop may take all the same [s]."""
+    """Hindrance of a stop, and how long a stop may take all the same [s]."""
 
     put: Callable[[Path], AbstractContextManager[StopBench] | Iterator[StopBench]]
     limit_s: float = SOON_S

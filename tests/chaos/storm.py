@@ -15,7 +15,7 @@ from tests.chaos.journals import device_side, distribution, noticed_s, rescues, 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a run showed."""
+    """Findings of one chaos run."""
 
     violations: tuple[str, ...]
     figures: tuple[str, ...]
@@ -46,7 +46,7 @@ def violations(run: Run, books: Books, twins: Twins) -> list[str]:
 
 
 def figures(run: Run, books: Books) -> list[str]:
-    """What a person wants to know of a run."""
+    """Figures of a run for a person."""
     all_rescues = rescues(run)
     by_state = _counted(Counter(row["state"] for row in books.jobs.values()))
     again = Counter(

@@ -144,7 +144,7 @@ TAMPERED_RUNS = {
 
 @pytest.fixture(scope="module")
 def books(folder: Path, undisturbed: Twins) -> Books:
-    """Of the undisturbed run."""
+    """Books of the undisturbed run."""
     return Books(engine(f"sqlite:///{folder / 'undisturbed.sqlite'}"))
 
 

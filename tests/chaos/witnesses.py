@@ -46,7 +46,7 @@ class Witness(Thread):
 
 @dataclass(frozen=True)
 class Sight:
-    """What a bench's devices were seen to be, from one moment [s, Unix time] to the next sight."""
+    """State of a bench's devices as it was seen, from one moment [s, Unix time] to the next sight."""
 
     at: float
     safe: bool
@@ -185,7 +185,7 @@ def master_of(state: dict[str, Any]) -> int:
 
 @dataclass
 class Seen:
-    """What was read as committed while the storm lasted."""
+    """Rows that were read as committed while the storm lasted."""
 
     complete: dict[str, str] = field(default_factory=dict)
     """Of sealed recordings: id and content hash."""
@@ -196,7 +196,7 @@ class Seen:
 
 
 class DatabaseWitness(Witness):
-    """What was once committed, read by SQL."""
+    """Witness of what was once committed, read by SQL."""
 
     def __init__(self, database_url: str) -> None:
         super().__init__("database", 0.4)

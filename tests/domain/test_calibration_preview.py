@@ -1,6 +1,4 @@
-"""What a calibration is worth before it runs: figures of the default plan, limits out of reach, what the preview rests
-on.
-"""
+"""Preview of a calibration before it runs: figures of the default plan, limits out of reach, what it rests on."""
 
 import re
 from dataclasses import replace

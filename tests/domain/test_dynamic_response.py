@@ -75,6 +75,7 @@ def test_limits_are_judged(context: Context) -> None:
     limits = {"delay_ms": 3.0, "bandwidth_hz": 40.0, "stamp_scatter_ms": 0.1}
     result = analysed(context, SwungUnit(1.0, 1e-3, 5e-3), limits=limits)
     params = parameters_of(RESPONSE, context, frequencies_hz=FREQUENCIES, axes=("x",), limits=limits)
+    assert RESPONSE.quantities is not None
     assert tuple(c.name for c in result.checks) == RESPONSE.quantities(params, context)
     assert {c.name: c.passed for c in result.checks} == {
         "gyro x delay": False,
@@ -99,7 +100,7 @@ def answers(gains: Any, phases: Any, frequencies: Any = FREQUENCIES, sd: float =
     """Responses with given ln gains and phases [rad], known to `sd` each."""
     values = np.exp(np.asarray(gains) + 1j * np.asarray(phases))
     return [
-        Response(f"x {f:g} Hz", f, 0.01, complex(v), sd, sd, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+        Response(f"x {f:g} Hz", f, 0.01, complex(v), sd, sd, 1.0, 0.0, 0.0, 0.0, 0.0)
         for f, v in zip(frequencies, values, strict=True)
     ]
 
@@ -192,6 +193,29 @@ def test_recordings_that_show_no_response_are_refused(context: Context, change: 
     spoilt = [MemoryRecording(r.info, change(r.raw.astype(np.float64))) for r in recordings]
     with pytest.raises(UnfitRecording, match=words):
         RESPONSE.analyse(spoilt, params, context)
+
+
+def test_recordings_of_another_kind_are_refused(context: Context) -> None:
+    params, recordings = taken(context, SwungUnit())
+    info = recordings[0].info
+    station = info.station
+    assert station is not None
+    assert station.sinusoid is not None
+    counted = replace(info.channels[0], unit="count", scale=1.0)
+    slow = replace(station, sinusoid=replace(station.sinusoid, frequency_hz=1e-5))
+    for other, words in (
+        (replace(info, channels=(counted, *info.channels[1:])), "gyro_x is in count: a response needs a nominal scale"),
+        (replace(info, station=replace(station, sinusoid=None)), "its station has no sinusoid of the outer axis"),
+        (replace(info, station=slow), "cannot tell a sinusoid of 1e-05 Hz from a drift"),
+    ):
+        with pytest.raises(UnfitRecording, match=words):
+            RESPONSE.analyse([MemoryRecording(other, recordings[0].raw), *recordings[1:]], params, context)
+
+
+def test_three_recordings_at_two_frequencies_are_refused(context: Context) -> None:
+    params, recordings = taken(context, SwungUnit())
+    with pytest.raises(UnfitRecording, match="gyro_x: a delay and a lag need 3 frequencies, there are 2"):
+        RESPONSE.analyse([*recordings[:2], recordings[1]], params, context)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from procedures.core.limits import Verdict
+from procedures.core.thermal_correction import TemperatureRange
 from procedures.methods import discover
 from procedures.procedure import Evidence
 
@@ -47,6 +48,18 @@ def test_what_is_refused(change: dict[str, Any], field: str) -> None:
     with pytest.raises(ValidationError) as refused:
         discover()["entered_thermal_correction"].params.model_validate(parameters(**change))
     assert refused.value.errors()[0]["loc"][0] == field
+
+
+def test_ranges_are_those_of_the_correction_and_are_given_both_or_not_at_all() -> None:
+    method = discover()["entered_thermal_correction"]
+    case, converter = (-20.0, 50.0), (-10.0, 60.0)
+    both = method.params.model_validate(parameters(case_range_c=case, converter_range_c=converter))
+    (made,) = method.corrections(method.analyse(Evidence(), both, None))
+    assert made.value.fitted_range == TemperatureRange(case, converter)
+    with pytest.raises(ValidationError, match="case_range_c and converter_range_c: both or none"):
+        method.params.model_validate(parameters(case_range_c=case))
+    with pytest.raises(ValidationError, match="case_range_c = 50, -20: the lower temperature first"):
+        method.params.model_validate(parameters(case_range_c=case[::-1], converter_range_c=converter))
 
 
 def test_coefficients_without_uncertainties_are_refused_and_zeros_fail() -> None:

@@ -1,4 +1,4 @@
-"""What every fit stands on, against closed forms and scipy's own."""
+"""Least squares, on which every fit stands, against closed forms and scipy's own."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What joins the noise model beside the five coefficients, each against a closed form or a record made elsewhere."""
+"""Parts of the noise model besides the five coefficients, each against a closed form or a record made elsewhere."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ def joined() -> tuple[Joined, int]:
 
 
 def process_covariances(count: int, cell_s: float, time_s: float) -> Array:
-    """Of means over cells of a process of unit variance."""
+    """Covariances of means over cells, of a process of unit variance."""
     ratio = time_s / cell_s
     a = np.exp(-1.0 / ratio)
     gamma = ratio**2 * (1.0 - a) ** 2 * a ** (np.arange(count) - 1.0)
@@ -146,7 +146,7 @@ def test_a_shift_of_the_level_is_placed_and_is_no_walk() -> None:
 
 
 def test_a_plain_counter_at_rest_has_a_limit_that_holds() -> None:
-    """Of ten counters; a limit of 95 % that failed three times of ten would be none (1 %)."""
+    """Ten counters are judged; a limit of 95 % that failed three times of ten would be none (1 %)."""
     held = 0
     for seed in range(10):
         record = counter(np.random.default_rng((8, seed)))
@@ -177,7 +177,7 @@ def test_a_resonance_is_left_out_and_the_rest_keeps_its_claims() -> None:
 
 
 def test_a_record_keeps_what_a_counter_without_dither_does_not_tell() -> None:
-    """What was known of N stays; where nothing was known, the record has the limit, never zero."""
+    """A known N stays; where nothing was known, the record has the limit, never zero."""
     (summary,) = analysed(counter(np.random.default_rng((8, 0)))).channels
     limit = summary.mean("random_walk").values[0].upper_limit
     assert summary.noise_over(NoiseCoefficients(random_walk=0.25)).random_walk == 0.25

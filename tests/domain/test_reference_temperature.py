@@ -17,7 +17,7 @@ from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers
 from procedures.catalog.calibration_12_orientations import PROCEDURE, Params, schedule
 from procedures.core.converter import ConverterModel, Normalised
-from procedures.core.errors import BadParameter, MissingChannel
+from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo
 from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
 from procedures.core.temperature.thermometers import SensorCorrection, ThermometerCorrection
@@ -160,6 +160,11 @@ def test_recordings_without_a_bench_are_brought_to_the_reference_by_the_units_co
     assert any("beyond the range" in w for w in beyond.warnings)
     with pytest.raises(BadParameter, match="has no thermal correction yet"):
         method.analyse(Evidence(tuple(data)), params, replace(unit, thermal_correction=None))
+    with pytest.raises(BadParameter, match="needs the recordings' unit"):
+        method.analyse(Evidence(tuple(data)), params, None)
+    short = [MemoryRecording(replace(r.info, count=9), r.raw[:9]) for r in data]
+    with pytest.raises(UnfitRecording, match="lasts 9 s: thermal_correction=current needs at least 10 s"):
+        method.analyse(Evidence(tuple(short)), params, unit)
 
 
 def test_without_the_correction_it_is_wrong_by_many_standard_uncertainties():

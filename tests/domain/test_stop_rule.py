@@ -67,7 +67,7 @@ def test_a_dwell_ends_when_the_declared_noise_has_reached_the_target():
 
 
 def test_noise_that_is_not_the_declared_one_goes_on_to_the_longest_time():
-    """Of 40 dwells three times as noisy none stops; of 40 sound ones all but a few in a thousand."""
+    """None of 40 dwells three times as noisy stops; of 40 sound ones all but a few in a thousand do."""
     rng = np.random.Generator(np.random.PCG64(2))
     noisy = [dwelt(rule(60.0), samples(rng, 120.0, 3.0)) for _ in range(40)]
     sound = [dwelt(rule(60.0), samples(rng, 120.0)) for _ in range(40)]

@@ -7,7 +7,8 @@ import pytest
 
 from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.limits import Verdict
-from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Quantity
+from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Quantity, Station
+from procedures.core.table_angles import TableAngles
 from procedures.core.thermal_correction import Form
 from procedures.core.unit import Unit
 from procedures.methods import discover, thermal_correction_of_recordings
@@ -140,6 +141,9 @@ def test_what_is_refused(imported: list[MemoryRecording]) -> None:
     refused("one for each of the 3", BadParameter, imported, up=("x", "y"))
     refused("each of x, y, z upwards", BadParameter, imported, up=("x", "y", "y"))
     refused("has no angles of its own", BadParameter, imported, up=None)
+    tilted = Station(0, "tilted", TableAngles(0.0, 45.0, 0.0), None, 0.0, 60.0)
+    leaning = [replace(r, info=replace(r.info, station=tilted)) for r in imported]
+    refused("no axis of the unit stood upwards", UnfitRecording, leaning, up=None)
     refused("T9", MissingChannel, imported, converter_sensor="T9")
     counts = [
         replace(r, info=replace(r.info, channels=tuple(_in_counts(c) for c in r.info.channels))) for r in imported

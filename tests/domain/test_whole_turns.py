@@ -131,7 +131,7 @@ def test_the_budget_of_each_coefficient_has_its_sources_and_makes_up_the_total(t
 
 
 def test_errors_have_the_spread_that_is_claimed_and_residuals_the_chi_square(turnable: Context) -> None:
-    """Of 120 units each of 21 spreads is known to 6.5 %: within four of these; so the mean chi-square of 33 · 120."""
+    """With 120 units each of 21 spreads is known to 6.5 %: within four of these; so the mean chi-square of 33 · 120."""
     rng, units_made = np.random.Generator(np.random.Philox(5)), 120
     stations = SHORT.stations()
     seconds = np.array([s.record_s for s in stations])

@@ -31,7 +31,7 @@ ANYTHING_IS_A_SOAK = SoakCriterion(slope_c_min=100.0, window_s=60.0, air_within_
 
 
 def station(index: int, legs: Sequence[Leg]) -> Station:
-    """Of a run of the rig: each leg ends when its time is over."""
+    """Station of a run of the rig: each leg ends when its time is over."""
     made = tuple(ProfileLeg(g.target_c, g.ramp_c_min, 0.0, g.seconds + 60.0, g.seconds) for g in legs)
     profile = TemperatureProfile(made, ANYTHING_IS_A_SOAK)
     axis = "xyz"[index]

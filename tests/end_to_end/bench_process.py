@@ -115,7 +115,7 @@ class BenchProcess:
             database.dispose()
 
     def stop_from_elsewhere(self) -> None:
-        """What another process does that has the database, and is asked to stop the bench."""
+        """Act of another process that has the database, and is asked to stop the bench."""
         stores, database = open_stores(self.environment["BENCH_DATABASE_URL"])
         try:
             stores.benches.stop_bench(BenchStop("sim", now(), "a test"))

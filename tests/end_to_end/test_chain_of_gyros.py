@@ -18,10 +18,21 @@ import yaml
 
 from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
+from tests.kit.consumer_files import (
+    OF_THE_MATRIX,
+    OF_THE_OFFSET,
+    Numbers,
+    assigned,
+    commented_bias,
+    of_ardupilot,
+    of_px4,
+    stated_loss,
+)
+from tests.kit.logged_unit import RATE_HZ, declare_noise, exported, found_noise, imported
 from tests.service.client import Client
 
 G, LATITUDE, EARTH = 9.81, 50.0, 7.292115e-5
-RATE, STAND_S, STANDS = 100.0, 4.0, 12
+STAND_S, STANDS = 4.0, 12
 SD = {"gyro": 1e-7, "accelerometer": 1e-4}
 """White noise of a sample [rad/s], [m/s²]. Twelve stands of 400 samples give K of the gyros by the Earth's rate to
 about ``1e-7/20/7.3e-5/√(12/3) = 3e-5``; its cross-couplings and scale errors are 1e-2."""
@@ -31,7 +42,6 @@ FACTOR = 4.0
 """Standard uncertainties within which a corrected rate must be: the length of a vector of three normal components
 exceeds four times the root of the sum of their variances with a chance of 1e-9 (equal ones) to 6e-5 (one alone)."""
 UNIT = "CHAIN-G"
-COLUMNS = {"a": ("accelerometer", "specific_force", "m/s^2"), "g": ("gyro", "angular_rate", "rad/s")}
 
 
 def attitude(outer: float, middle: float, inner: float) -> np.ndarray:
@@ -85,10 +95,7 @@ class Chain:
     outputs: np.ndarray
 
     def export(self, form: str) -> str:
-        path = f"/api/v1/units/{UNIT}/calibrations/{self.force}/export"
-        answer = self.client.http.get(path, params={"format": form, "other": self.gyro})
-        assert answer.status_code == 200, answer.text
-        return answer.text
+        return exported(self.client, UNIT, self.force, self.gyro, form)
 
     @property
     def allowed(self) -> np.ndarray:
@@ -101,51 +108,20 @@ class Chain:
         extended = np.column_stack([np.ones(len(self.rates)), self.rates])
         gradient = np.einsum("pi,nj->npij", inverse, extended).reshape(len(self.rates), 3, 12)
         variance = np.einsum("npk,kl,npl->n", gradient, covariance, gradient)
-        return FACTOR * np.sqrt(variance + (inverse**2).sum() * SD["gyro"] ** 2 / (STAND_S * RATE))
-
-
-def imported(client: Client, values: np.ndarray) -> str:
-    names = ["ax", "ay", "az", "gx", "gy", "gz"]
-    rows = np.column_stack([np.arange(len(values)) / RATE, values])
-    text = "\n".join([",".join(["t", *names]), *(",".join(repr(float(x)) for x in row) for row in rows)]) + "\n"
-    channels = []
-    for name in names:
-        triad, quantity, unit = COLUMNS[name[0]]
-        channels.append({"name": f"{triad}_{name[1]}", "column": name, "quantity": quantity, "unit": unit})
-    description = {"unit": UNIT, "rate_hz": RATE, "time_column": "t", "time_unit": "s", "channels": channels}
-    answer = client.import_files(description, text.encode())
-    assert answer.status_code == 201, answer.text
-    return answer.json()["id"]
-
-
-def declare_noise(client: Client, recording: str) -> None:
-    """Put the random walks that the service finds in a recording into the unit's record."""
-    answer = client.analyse("noise_analysis", recordings=[recording])
-    assert answer.status_code == 201, answer.text
-    found = {
-        c["channel"]: c["coefficients"][1]["likelihood"]["value"]
-        for c in answer.json()["document"]["launches"][0]["channels"]
-    }
-    record = {
-        t: {"noise": [{"random_walk": found[f"{t}_{x}"]} for x in "xyz"], "noise_origin": "noise_analysis"} for t in SD
-    }
-    known = client.http.get(f"/api/v1/units/{UNIT}").json()
-    put = client.http.put(
-        f"/api/v1/units/{UNIT}", json={"sample_rate_hz": RATE, "channels": known["channels"], **record}
-    )
-    assert put.status_code == 200, put.text
+        return FACTOR * np.sqrt(variance + (inverse**2).sum() * SD["gyro"] ** 2 / (STAND_S * RATE_HZ))
 
 
 @pytest.fixture(scope="module")
 def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
     file = tmp_path_factory.mktemp("gyros") / "bench.sqlite"
-    made, n = Made.of(5), int(STAND_S * RATE)
+    made, n = Made.of(5), int(STAND_S * RATE_HZ)
     angles = [tuple(float(x) for x in row) for row in made.rng.integers(-180, 180, (STANDS, 3))]
     new = [tuple(float(x) for x in row) for row in made.rng.integers(-180, 180, (6, 3))]
     with connect(Settings(database_url=f"sqlite:///{file}"), None, drive=False) as http:
         client = Client(http)
-        declare_noise(client, imported(client, made.stand((0.0, 0.0, 0.0), 13_000)))
-        stands = [imported(client, made.stand(a, n)) for a in angles]
+        still = imported(client, UNIT, made.stand((0.0, 0.0, 0.0), 13_000))
+        declare_noise(client, UNIT, found_noise(client, still))
+        stands = [imported(client, UNIT, made.stand(a, n)) for a in angles]
         site = {"gravity_m_s2": G, "latitude_deg": LATITUDE, "positions": angles}
         answer = client.analyse("multi_position_calibration_of_recordings", recordings=stands, parameters=site)
         assert (answer.status_code, answer.json()["verdict"]) == (201, "pass"), answer.text
@@ -156,48 +132,34 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
         yield Chain(client, of["gyro"], of["accelerometer"], rates, outputs)
 
 
-Numbers = dict[str, np.ndarray]
-"""Offset, matrix and frame as a consumer's file has them; the frame takes the unit's axes to the consumer's."""
+BIAS = "gyro bias [rad/s]"
+"""Words of the comment that has it. The frame of `Numbers` takes the unit's axes to the consumer's."""
 
 
 def by_kalibr(text: str) -> Numbers:
     """Kalibr, scale-misalignment: ω_m = M·C_gyro_i·ω_i; the bias stands in a comment."""
     read = yaml.safe_load(text)["imu0"]
     matrix = np.array(read["gyroscopes"]["M"]) @ np.array(read["gyroscopes"]["C_gyro_i"])
-    return {"offset": _commented_bias(text), "matrix": matrix, "frame": np.array(read["R_imu_from_unit"])}
+    return {"offset": commented_bias(text, BIAS), "matrix": matrix, "frame": np.array(read["R_imu_from_unit"])}
 
 
 def by_openvins(text: str) -> Numbers:
     """OpenVINS, model kalibr: ω_m = Tw·R_IMUtoGYRO·ω_I, of Tw the lower triangle."""
     read = yaml.safe_load(text.removeprefix("%YAML:1.0\n"))["imu0"]
     matrix = np.tril(np.array(read["Tw"])) @ np.array(read["R_IMUtoGYRO"])
-    return {"offset": _commented_bias(text), "matrix": matrix, "frame": np.array(read["R_imu_from_unit"])}
-
-
-def _commented_bias(text: str) -> np.ndarray:
-    (line,) = [x for x in text.splitlines() if x.startswith("#") and "gyro bias [rad/s]" in x]
-    return np.array(json.loads(line[line.rindex("[") : line.rindex("]") + 1]))
-
-
-def _assigned(text: str) -> dict[str, np.ndarray]:
-    found = {}
-    for line in text.splitlines():
-        name, equals, rest = line.partition(" = [")
-        if equals and not line.startswith("%"):
-            found[name] = np.array([[float(x) for x in row.split()] for row in rest.partition("]")[0].split(";")])
-    return found
+    return {"offset": commented_bias(text, BIAS), "matrix": matrix, "frame": np.array(read["R_imu_from_unit"])}
 
 
 def by_matlab(text: str) -> Numbers:
     """MATLAB: C = U·A + b on rows, so K = (Aᵀ)⁻¹ and the offset is −K·b."""
-    found = _assigned(text)
+    found = assigned(text)
     matrix = np.linalg.inv(found["A_gyro"].T)
     return {"offset": -matrix @ found["b_gyro"].ravel(), "matrix": matrix, "frame": np.eye(3)}
 
 
 def by_psins(text: str) -> Numbers:
     """PSINS: ω_out = (I + dKg)·ω + eb; dKGij in the order yx, zx, zy, xy, xz, yz."""
-    found = _assigned(text)
+    found = assigned(text)
     matrix = np.eye(3) + np.diag(found["dKGii"].ravel())
     places = [(1, 0), (2, 0), (2, 1), (0, 1), (0, 2), (1, 2)]
     for (i, j), value in zip(places, found["dKGij"].ravel(), strict=True):
@@ -207,14 +169,13 @@ def by_psins(text: str) -> Numbers:
 
 def by_ardupilot(text: str) -> Numbers:
     """ArduPilot: raw − INS_GYROFFS of each axis; it has no scale of gyros."""
-    read = dict(line.split(",") for line in text.splitlines() if not line.startswith("#"))
-    return _offsets([float(read[f"INS_GYROFFS_{axis}"]) for axis in "XYZ"])
+    read = of_ardupilot(text)
+    return _offsets([read[f"INS_GYROFFS_{axis}"] for axis in "XYZ"])
 
 
 def by_px4(text: str) -> Numbers:
     """PX4: raw − OFF of each axis; it has no scale of gyros."""
-    rows = [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
-    read = {row[2]: float(row[3]) for row in rows}
+    read = of_px4(text)
     return _offsets([read[f"CAL_GYRO0_{axis}OFF"] for axis in "XYZ"])
 
 
@@ -232,15 +193,6 @@ def worst(numbers: Numbers, chain: Chain, allowed: np.ndarray) -> float:
     return float(np.max(errors(numbers, chain) / allowed))
 
 
-OF_THE_OFFSET: dict[str, Callable[[Numbers], Numbers]] = {
-    "sign of the offset": lambda n: {**n, "offset": -n["offset"]},
-    "order of the offset": lambda n: {**n, "offset": n["offset"][::-1]},
-}
-OF_THE_MATRIX: dict[str, Callable[[Numbers], Numbers]] = {
-    "order of the axes": lambda n: {**n, "matrix": n["matrix"][::-1, ::-1]},
-    "transposed matrix": lambda n: {**n, "matrix": n["matrix"].T},
-    "inverted matrix": lambda n: {**n, "matrix": np.linalg.inv(n["matrix"])},
-}
 WHOLE = {"kalibr": by_kalibr, "openvins": by_openvins, "matlab": by_matlab, "psins": by_psins}
 OFFSETS = {"ardupilot": by_ardupilot, "px4": by_px4}
 
@@ -263,10 +215,9 @@ def test_known_rates_come_back_after_the_consumer_s_correction_and_not_after_a_w
 def test_an_autopilot_takes_the_bias_off_within_the_loss_that_its_file_states(form: str, chain: Chain) -> None:
     """The loss is stated at 100 deg/s on every axis, and is linear in the rate: its share at a rate |ω| is allowed."""
     text = chain.export(form)
-    (line,) = [x for x in text.splitlines() if "lost: scale factors and cross terms of the gyros" in x]
-    sizes = [float(word) for word in line.partition("up to ")[2].replace(",", "").split() if word[0].isdigit()]
+    loss = stated_loss(text, "lost: scale factors and cross terms of the gyros")
     share = np.abs(chain.rates).max(axis=1) / radians(100.0)
-    allowed = chain.allowed + np.linalg.norm(sizes) * share
+    allowed = chain.allowed + loss * share
     numbers = OFFSETS[form](text)
     assert worst({**numbers, "offset": np.zeros(3)}, chain, allowed) > 3.0, "uncorrected"
     assert worst(numbers, chain, allowed) <= 1.0

@@ -10,7 +10,7 @@ import runpy
 import shutil
 import struct
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,10 +20,21 @@ import yaml
 
 from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
+from tests.kit.consumer_files import (
+    OF_THE_MATRIX,
+    OF_THE_OFFSET,
+    Numbers,
+    assigned,
+    commented_bias,
+    of_ardupilot,
+    of_px4,
+    stated_loss,
+)
+from tests.kit.logged_unit import RATE_HZ, SIX, declare_noise, exported, found_noise, imported
 from tests.service.client import Client
 
-G, RATE, SD = 9.81, 100.0, 1e-3
-"""Gravity [m/s²], samples a second, noise of an accelerometer's sample [m/s²]: white, so N = SD/√RATE."""
+G, SD = 9.81, 1e-3
+"""Gravity [m/s²], samples a second, noise of an accelerometer's sample [m/s²]: white, so N = SD/√RATE_HZ."""
 GYRO_SD = 2e-5
 """Noise of a gyro's sample [rad/s]."""
 POSES, HELD_OUT, POSE_S = 24, 20, 4.0
@@ -47,10 +58,7 @@ class Chain:
     random_walk: float
 
     def export(self, form: str) -> str:
-        path = f"/api/v1/units/{self.unit}/calibrations/{self.calibration}/export"
-        answer = self.client.http.get(path, params={"format": form, "other": self.gyro})
-        assert answer.status_code == 200, answer.text
-        return answer.text
+        return exported(self.client, self.unit, self.calibration, self.gyro, form)
 
     @property
     def uncertainty(self) -> np.ndarray:
@@ -73,32 +81,6 @@ def directions(rng: np.random.Generator, n: int) -> np.ndarray:
     return v / np.linalg.norm(v, axis=1)[:, None]
 
 
-def log_of(values: np.ndarray, names: list[str]) -> bytes:
-    time = np.arange(len(values)) / RATE
-    rows = "\n".join(",".join(repr(float(x)) for x in row) for row in np.column_stack([time, values]))
-    return (",".join(["t", *names]) + "\n" + rows + "\n").encode()
-
-
-def imported(client: Client, unit: str, data: bytes, names: list[str]) -> str:
-    kind = {"a": ("accelerometer", "specific_force", "m/s^2"), "g": ("gyro", "angular_rate", "rad/s")}
-    channels = []
-    for column in names:
-        triad, quantity, size = kind[column[0]]
-        channels.append({"name": f"{triad}_{column[1]}", "column": column, "quantity": quantity, "unit": size})
-    description = {"unit": unit, "rate_hz": RATE, "time_column": "t", "time_unit": "s", "channels": channels}
-    answer = client.import_files(description, data)
-    assert answer.status_code == 201, answer.text
-    return answer.json()["id"]
-
-
-def found_noise(client: Client, recording: str) -> dict[str, float]:
-    """Random walks by channel, as the service finds them."""
-    answer = client.analyse("noise_analysis", recordings=[recording])
-    assert answer.status_code == 201, answer.text
-    channels = answer.json()["document"]["launches"][0]["channels"]
-    return {c["channel"]: c["coefficients"][1]["likelihood"]["value"] for c in channels}  # Q, N, B, K, R
-
-
 def chain(client: Client, unit: str, cross: float, seed: int) -> Chain:
     rng = np.random.Generator(np.random.PCG64(seed))
     k = np.diag(1.0 + rng.uniform(-0.01, 0.01, 3)) + cross * rng.uniform(-1.0, 1.0, (3, 3)) * (1 - np.eye(3))
@@ -108,18 +90,14 @@ def chain(client: Client, unit: str, cross: float, seed: int) -> Chain:
         return b + v @ k.T + SD * rng.normal(size=v.shape)
 
     rest = np.tile(directions(rng, 1) * G, (60_000, 1))
-    six = ["ax", "ay", "az", "gx", "gy", "gz"]
-    still = imported(
-        client, unit, log_of(np.column_stack([out(rest), GYRO_SD * rng.normal(size=rest.shape)]), six), six
-    )
+    still = imported(client, unit, np.column_stack([out(rest), GYRO_SD * rng.normal(size=rest.shape)]))
     walks = found_noise(client, still)
-    per_pose, moving = int(POSE_S * RATE), int(RATE)
+    per_pose, moving = int(POSE_S * RATE_HZ), int(RATE_HZ)
     pieces = [np.tile(directions(rng, 1) * G, (2000, 1))]
     for up in directions(rng, POSES):
         shaken = pieces[-1][-1] + (up * G - pieces[-1][-1]) * np.linspace(0, 1, moving)[:, None]
         pieces += [shaken + rng.normal(size=(moving, 3)), np.tile(up * G, (per_pose, 1))]
-    three = six[:3]
-    poses = imported(client, unit, log_of(out(np.concatenate(pieces)), three), three)
+    poses = imported(client, unit, out(np.concatenate(pieces)), SIX[:3])
     answer = client.analyse("scalar_calibration", recordings=[poses], parameters={"gravity_m_s2": G})
     assert (answer.status_code, answer.json()["verdict"]) == (201, "pass"), answer.text
     listed = client.http.get(f"/api/v1/units/{unit}/calibrations").json()["items"]
@@ -148,20 +126,6 @@ def gyro_calibration(client: Client, unit: str) -> str:
     return answer.json()["id"]
 
 
-def declare_noise(client: Client, unit: str, walks: dict[str, float]) -> None:
-    record = {
-        triad: {
-            "noise": [{"random_walk": walks[f"{triad}_{axis}"]} for axis in "xyz"],
-            "noise_origin": "noise_analysis",
-        }
-        for triad in ("gyro", "accelerometer")
-    }
-    known = client.http.get(f"/api/v1/units/{unit}").json()
-    body = {"sample_rate_hz": RATE, "channels": known["channels"], **record}
-    answer = client.http.put(f"/api/v1/units/{unit}", json=body)
-    assert answer.status_code == 200, answer.text
-
-
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
     file = tmp_path_factory.mktemp("chain") / "bench.sqlite"
@@ -179,60 +143,46 @@ def diagonal(client: Client) -> Chain:
     return chain(client, "CHAIN-2", CROSS["diagonal"], seed=12)
 
 
-Numbers = dict[str, np.ndarray]
-"""Offset and matrix as a consumer's file has them: mutations are made here."""
+BIAS = "accelerometer bias [m/s^2]"
+"""Words of the comment that has it."""
 
 
 def by_kalibr(text: str) -> Numbers:
     """Kalibr's model: a_m = M·a_i; the bias is no field, it stands in a comment of the file."""
     read = yaml.safe_load(text)["imu0"]["accelerometers"]
-    return {"offset": _commented_bias(text), "matrix": np.array(read["M"])}
+    return {"offset": commented_bias(text, BIAS), "matrix": np.array(read["M"])}
 
 
 def by_openvins(text: str) -> Numbers:
     """OpenVINS, model kalibr: a_m = Ta·a_I, of which it keeps the lower triangle."""
     read = yaml.safe_load(text.removeprefix("%YAML:1.0\n"))["imu0"]
-    return {"offset": _commented_bias(text), "matrix": np.tril(np.array(read["Ta"]))}
-
-
-def _commented_bias(text: str) -> np.ndarray:
-    (line,) = [x for x in text.splitlines() if x.startswith("#") and "accelerometer bias [m/s^2]" in x]
-    return np.array(json.loads(line[line.rindex("[") : line.rindex("]") + 1]))
+    return {"offset": commented_bias(text, BIAS), "matrix": np.tril(np.array(read["Ta"]))}
 
 
 def by_matlab(text: str) -> Numbers:
     """MATLAB's accelcal: C = U·A + b on rows."""
-    found = {}
-    for line in text.splitlines():
-        name, equals, rest = line.partition(" = [")
-        if equals and not line.startswith("%"):
-            found[name] = np.array([[float(x) for x in row.split()] for row in rest.partition("]")[0].split(";")])
+    found = assigned(text)
     return {"offset": found["b_accelerometer"].ravel(), "matrix": found["A_accelerometer"]}
 
 
 def by_psins(text: str) -> Numbers:
     """PSINS: f_out = (I + dKa)·f + db, dKa lower triangular."""
-    found = {}
-    for line in text.splitlines():
-        name, equals, rest = line.partition(" = [")
-        if equals and not line.startswith("%"):
-            found[name] = np.array([float(x) for x in rest.partition("]")[0].replace(";", " ").split()])
-    matrix = np.eye(3) + np.diag(found["dKAii"])
-    for (i, j), value in zip([(1, 0), (2, 0), (2, 1)], found["dKAij"], strict=True):
+    found = assigned(text)
+    matrix = np.eye(3) + np.diag(found["dKAii"].ravel())
+    for (i, j), value in zip([(1, 0), (2, 0), (2, 1)], found["dKAij"].ravel(), strict=True):
         matrix[i, j] = value
-    return {"offset": found["db"], "matrix": matrix}
+    return {"offset": found["db"].ravel(), "matrix": matrix}
 
 
 def by_ardupilot(text: str) -> Numbers:
     """ArduPilot: (raw − INS_ACCOFFS)·INS_ACCSCAL of each axis."""
-    read = dict(line.split(",") for line in text.splitlines() if not line.startswith("#"))
-    return _of_axes(*([float(read[f"INS_{name}_{axis}"]) for axis in "XYZ"] for name in ("ACCOFFS", "ACCSCAL")))
+    read = of_ardupilot(text)
+    return _of_axes(*([read[f"INS_{name}_{axis}"] for axis in "XYZ"] for name in ("ACCOFFS", "ACCSCAL")))
 
 
 def by_px4(text: str) -> Numbers:
     """PX4: (raw − OFF)·SCALE of each axis."""
-    rows = [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
-    read = {row[2]: float(row[3]) for row in rows}
+    read = of_px4(text)
     return _of_axes(*([read[f"CAL_ACC0_{axis}{name}"] for axis in "XYZ"] for name in ("OFF", "SCALE")))
 
 
@@ -249,13 +199,7 @@ def on_rows(numbers: Numbers, u: np.ndarray) -> np.ndarray:
     return u @ numbers["matrix"] + numbers["offset"]
 
 
-MUTATIONS: dict[str, Callable[[Numbers], Numbers]] = {
-    "sign of the offset": lambda n: {**n, "offset": -n["offset"]},
-    "order of the offset": lambda n: {**n, "offset": n["offset"][::-1]},
-    "order of the axes": lambda n: {**n, "matrix": n["matrix"][::-1, ::-1]},
-    "transposed matrix": lambda n: {**n, "matrix": n["matrix"].T},
-    "inverted matrix": lambda n: {**n, "matrix": np.linalg.inv(n["matrix"])},
-}
+MUTATIONS = {**OF_THE_OFFSET, **OF_THE_MATRIX}
 CONSUMERS = {
     "kalibr": (by_kalibr, forward), "openvins": (by_openvins, forward), "matlab": (by_matlab, on_rows),
     "psins": (by_psins, forward), "ardupilot": (by_ardupilot, forward), "px4": (by_px4, forward),
@@ -271,9 +215,7 @@ def allowance(one: Chain, form: str, text: str) -> np.ndarray:
     """Claimed uncertainty; of the autopilots also the loss that their file states, which is of one g on every axis."""
     loss = 0.0
     if form in ("ardupilot", "px4"):
-        (line,) = [x for x in text.splitlines() if "lost: cross terms of the accelerometers" in x]
-        sizes = [float(word) for word in line.partition("up to ")[2].replace(",", "").split() if word[0].isdigit()]
-        loss = float(np.linalg.norm(sizes))
+        loss = stated_loss(text, "lost: cross terms of the accelerometers")
     return FACTOR * one.uncertainty + loss
 
 
@@ -331,7 +273,7 @@ def test_the_c_function_corrects_it(whole: Chain, tmp_path: Path) -> None:
 def test_the_noise_found_is_the_noise_made_and_reaches_kalibr(whole: Chain) -> None:
     """60 000 white samples give N to 1/√(2·60 000) = 0.3 %; the estimator shares it with four others, 3 % is ample."""
     read = yaml.safe_load(whole.export("kalibr-imu"))
-    assert whole.random_walk == pytest.approx(SD / RATE**0.5, rel=0.03)
-    assert read["accelerometer_noise_density"] == pytest.approx(SD / RATE**0.5, rel=0.03)
-    assert read["gyroscope_noise_density"] == pytest.approx(GYRO_SD / RATE**0.5, rel=0.03)
-    assert read["update_rate"] == RATE
+    assert whole.random_walk == pytest.approx(SD / RATE_HZ**0.5, rel=0.03)
+    assert read["accelerometer_noise_density"] == pytest.approx(SD / RATE_HZ**0.5, rel=0.03)
+    assert read["gyroscope_noise_density"] == pytest.approx(GYRO_SD / RATE_HZ**0.5, rel=0.03)
+    assert read["update_rate"] == RATE_HZ

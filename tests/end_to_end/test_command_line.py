@@ -40,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def calibrated(folder: Path) -> Any:
-    """What ``bench run`` printed of a short calibration."""
+    """Output of ``bench run`` about a short calibration."""
     done = command_in(folder)("run", "calibration_12_orientations", "--unit", "SIM-0001", "--seed", 3, *FAST, "--json")
     assert done.code == {"pass": 0, "fail": 1}[done.json()["job"]["verdict"]], done.err
     return done.json()

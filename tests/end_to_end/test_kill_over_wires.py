@@ -14,14 +14,14 @@ import pytest
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.wall_clock import monotonic_s
+from tests.chaos.journals import NOTICE_LIMIT_S, NOTICED
 from tests.conformance.served import Served, served
 from tests.end_to_end.bench_process import BenchProcess
+from tests.kit.killed_on_wires import AT_REST_DEG_S
 from tests.kit.wired_bench import LANGUAGES, bench_file
 
 pytestmark = pytest.mark.timeout(240)
 FACTOR = 4.0
-AT_REST_DEG_S = 0.01
-"""Rate above which the table moves. One that a controller holds is servoed and not locked; a move has 60 deg/s."""
 PLAN = {"positions": [[0, 170, 0, 2], [0, -170, 0, 2]], "delay_from": "rest", "settle_s": 0.5}
 
 
@@ -75,9 +75,10 @@ def test_killed_in_a_move_it_is_safe_by_its_own_readings_and_a_turned_table_is_n
     behind.do(turn_by_hand)
     bench.start()
     said = bench.events(job)
-    assert "made safe by the supervisor" in said
-    noticed = float(said.split("made safe by the supervisor ")[1].split(" s after")[0])
-    assert noticed < 2.0
+    found = NOTICED.search(said)
+    assert found is not None, said
+    noticed_s = float(found[1])
+    assert noticed_s < NOTICE_LIMIT_S
     standing = bench.client.get("/api/v1/benches/east").json()
     assert standing["state"] == "stopped"
     assert "the middle axis of the turntable stands at" in str(standing)

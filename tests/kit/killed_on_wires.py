@@ -3,7 +3,8 @@
 The devices are served simulators of the caller's process, whose world is the witness.
 """
 
-import re
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.wall_clock import monotonic_s
+from tests.chaos.journals import NOTICED
 from tests.conformance.served import Served, served
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.wired_bench import AMBIENT_C, LANGUAGES, THERMAL_LANGUAGES, bench_file
@@ -55,16 +57,23 @@ class World:
 
 @dataclass(frozen=True)
 class Killed:
-    """Outcome of one kill."""
+    """Outcome of one kill, and the bench, whose service can be started again."""
 
     to_safe_s: float
     """From the kill to safe by read-back, as the register has it."""
     noticed_s: float
     """From the supervisor's notice to that, by its own words."""
     world: World
+    bench: BenchProcess
+    lease: str
+    """Path of the lease that the process drove."""
+
+    def __str__(self) -> str:
+        return f"kill to safe {self.to_safe_s:.3f} s, notice to safe {self.noticed_s:.3f} s, {self.world}"
 
 
-def killed_in(kind: str, database_url: str, folder: Path, port: int) -> Killed:
+@contextmanager
+def killed_in(kind: str, database_url: str, folder: Path, port: int) -> Generator[Killed]:
     """Drive a bench by manual mode, kill its process in the midst of `kind`, and wait for the supervisor."""
     thermal, factor = kind == "chamber", FACTORS[kind]
     with served(THERMAL_LANGUAGES if thermal else LANGUAGES, thermal=thermal, factor=factor) as behind:
@@ -74,7 +83,7 @@ def killed_in(kind: str, database_url: str, folder: Path, port: int) -> Killed:
         try:
             bench.start()
             bench.supervised()
-            _demanded(bench, kind)
+            lease = _demanded(bench, kind)
             bench.until(lambda: _world(behind).under_way, 60)
             killed_s = monotonic_s()
             bench.kill()
@@ -83,15 +92,21 @@ def killed_in(kind: str, database_url: str, folder: Path, port: int) -> Killed:
             bench.until(lambda: _noticed(folder) is not None, 10)
             noticed_s = _noticed(folder)
             assert noticed_s is not None
-            return Killed(to_safe_s, noticed_s, world)
+            yield Killed(to_safe_s, noticed_s, world, bench, lease)
         finally:
             bench.end()
 
 
-def _demanded(bench: BenchProcess, kind: str) -> None:
+def ask_for_lease(bench: BenchProcess) -> str:
+    """Ask for a lease of manual mode; return its path."""
     lease = bench.client.post(MANUAL, json={"reason": "a look", "by": "ann", "unit": "GL017"})
     assert lease.status_code == 201, lease.text
-    path = f"{MANUAL}/{lease.json()['id']}"
+    return f"{MANUAL}/{lease.json()['id']}"
+
+
+def _demanded(bench: BenchProcess, kind: str) -> str:
+    """Switch the unit on and demand `kind`; the path of the lease."""
+    path = ask_for_lease(bench)
 
     def ask(**body: Any) -> str:
         made = bench.client.post(f"{path}/demands", json={**body, "by": "ann"})
@@ -101,12 +116,13 @@ def _demanded(bench: BenchProcess, kind: str) -> None:
     key = ask(kind="supply_on")
     bench.until(lambda: bench.client.get(f"{path}/demands/{key}").json()["state"] == "done", 60)
     ask(kind=kind, **DEMANDS[kind])
+    return path
 
 
 def _noticed(folder: Path) -> float | None:
     """Time from notice to safe [s], from what the supervisor has written; None before it has."""
     for file in (*folder.rglob("*.log"), *folder.rglob("*.out")):
-        found = re.search(r"made safe by the supervisor ([0-9.]+) s after it noticed", file.read_text(errors="replace"))
+        found = NOTICED.search(file.read_text(errors="replace"))
         if found is not None:
             return float(found[1])
     return None

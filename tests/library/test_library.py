@@ -59,6 +59,18 @@ def test_samples_are_taken_as_people_have_them(shape, rng: np.random.Generator) 
     np.testing.assert_array_equal(inertial.allan(shape(y), 1.0).deviation, inertial.allan(y, 1.0).deviation)
 
 
+def test_a_family_is_what_each_statistic_gives_by_itself(rng: np.random.Generator) -> None:
+    y = rng.normal(size=2000)
+    found = inertial.allan_family(y, 50.0, points=12)
+    assert {"allan", "overlapping_allan", "modified_allan", "time", "hadamard", "overlapping_hadamard"} == set(found)
+    for name, curve in found.items():
+        alone = inertial.allan(y, 50.0, name, points=12)
+        assert curve.statistic == name
+        for values in ("tau_s", "deviation", "lower", "upper", "edf", "terms"):
+            np.testing.assert_allclose(getattr(curve, values), getattr(alone, values), rtol=1e-12)
+    assert list(inertial.allan_family(y, 50.0, ["time", "allan"])) == ["time", "allan"]
+
+
 def test_increments_are_rates_times_the_sample_period(rng: np.random.Generator) -> None:
     y = rng.normal(size=4000)
     rates, increments = inertial.allan(y, 100.0), inertial.allan(y / 100.0, 100.0, increments=True)
@@ -159,6 +171,8 @@ def test_both_parts_of_a_split_are_the_record(rng: np.random.Generator) -> None:
         (lambda: inertial.allan([1.0, np.nan, *range(20)], 1.0), "sample 1"),
         (lambda: inertial.allan(range(9), 1.0, "alan"), "one of allan, overlapping_allan"),
         (lambda: inertial.allan(range(9), 1.0, confidence=95), "between 0 and 1"),
+        (lambda: inertial.allan_family(range(9), 1.0, ["allan", "alan"]), "one of allan, overlapping_allan"),
+        (lambda: inertial.allan_family([1.0, np.nan, *range(20)], 1.0), "sample 1"),
         (lambda: inertial.noise(range(9), 1.0, unit="rpm"), "one of rad/s, deg/s, deg/h"),
         (lambda: inertial.noise(range(9), 1.0), "9 samples are too few"),
         (lambda: inertial.noise(range(9), 1.0, cell_s=0.1), "at least 1 s, one sample"),

@@ -1,4 +1,4 @@
-"""What a test says to the service about campaigns."""
+"""Requests of a test to the service about campaigns."""
 
 from typing import Any
 

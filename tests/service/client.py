@@ -1,4 +1,4 @@
-"""What a test says to the service."""
+"""Requests of a test to the service."""
 
 import json
 from urllib.parse import quote

@@ -1,4 +1,4 @@
-"""What readers of JUnit XML take, as checks of our own.
+"""Rules of readers of JUnit XML, as checks of our own.
 
 There is no standard. The strictest reader in wide use is Jenkins' xUnit plugin, which refuses a report that its schema
 (junit-10.xsd, version 10) does not allow: the elements, attributes and form of times below are what that schema says.

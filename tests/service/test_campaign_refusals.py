@@ -1,4 +1,4 @@
-"""What campaigns, runs, schedules and trends refuse: each names the field, the value and what is allowed."""
+"""Refusals of campaigns, runs, schedules and trends: each names the field, the value and what is allowed."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What commands print of a service's texts: as they are, for brackets and colons are no markup, and all of them."""
+"""Commands print a service's texts: as they are, for brackets and colons are no markup, and all of them."""
 
 import json
 from typing import Any

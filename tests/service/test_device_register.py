@@ -1,4 +1,4 @@
-"""What a bench's devices keep by themselves: seen from outside, with real processes that are really killed."""
+"""Register of a bench's devices: seen from outside, with real processes that are really killed."""
 
 import asyncio
 import json
@@ -262,7 +262,7 @@ def test_a_fault_plan_that_cannot_be_used_is_refused_by_name(text: str, named: s
 
 
 def test_faults_come_as_often_as_said_and_the_same_again(tmp_path: Path) -> None:
-    """Of 2000 tries at 0.1: 200 ± 13.4 (binomial), here within five of them."""
+    """Number of faults in 2000 tries at 0.1: 200 ± 13.4 (binomial), here within five of them."""
     rules = [{"verb": "supply.*", "kind": "fault", "probability": 0.1}]
     plan = FaultPlan.parse(json.dumps({"seed": 3, "rules": rules}))
 

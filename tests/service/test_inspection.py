@@ -1,4 +1,4 @@
-"""What the inspection finds is in the result's warnings: in the document, on its page, and on the command line."""
+"""Findings of the inspection are in the result's warnings: in the document, on its page, and on the command line."""
 
 import json
 from pathlib import Path

@@ -32,7 +32,7 @@ def address(database_url: str) -> Generator[str]:
 
 @dataclass
 class Heard:
-    """What one listener heard, in order."""
+    """Events that one listener heard, in order."""
 
     sequences: list[int] = field(default_factory=list[int])
     delays_s: list[float] = field(default_factory=list[float])

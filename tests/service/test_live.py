@@ -1,4 +1,4 @@
-"""What a bench does now: told while a job runs, to listeners and readers of this process and of another one."""
+"""Present state of a bench: sent while a job runs, to listeners and readers of this process and of another one."""
 
 import json
 from collections.abc import Generator, Iterator

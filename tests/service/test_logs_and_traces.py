@@ -1,4 +1,4 @@
-"""What a real process tells the outside: lines as JSON with what they are about, and a trace of every job."""
+"""Output of a real process: lines as JSON with what they are about, and a trace of every job."""
 
 import json
 import threading

@@ -35,7 +35,7 @@ CHAMBER = "the chamber cannot be reached: its link is lost"
 
 @pytest.fixture
 def register(tmp_path: Path) -> DeviceRegister:
-    """Of a bench that a process left in a move, its chamber led to 60 °C, its ambient being 22 °C."""
+    """Register of a bench that a process left in a move, its chamber led to 60 °C, its ambient being 22 °C."""
     made = abandoned(tmp_path, "job-1")
     link = made.open("a process that died too")
     link.note("chamber.command", {}, chamber_target_c=60.0, chamber_ambient_c=22.0)

@@ -1,4 +1,4 @@
-"""A lease of manual mode that is being left: no demand reaches a device while, or after, the bench is made safe.
+"""A session of manual mode that is being left: no demand reaches a device while, or after, the bench is made safe.
 
 The bench is a simulated one whose table takes as long to be made safe as the test wants, so every demand comes during
 that. Waits have no share in what is found: each is for an event of the session's own thread.
@@ -8,101 +8,17 @@ import asyncio
 from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import replace
-from datetime import timedelta
-from pathlib import Path
-from threading import Event, Thread
-from types import SimpleNamespace
-from typing import Any, cast
+from threading import Thread
+from typing import cast
 
 import pytest
 
-from bench_service.bench.devices import DeviceState
 from bench_service.bench.driven import ShuttingDown
-from bench_service.bench.live.values import LiveBoard
-from bench_service.drivers.device_register import DeviceRegister
-from bench_service.jobs.manual.reader import LeaseReader
-from bench_service.jobs.manual.runner import ManualRunner
 from bench_service.jobs.manual.session import ManualSession
-from bench_service.jobs.manual.store import LeaseNews, ManualStore
-from bench_service.model.manual import Answer, DemandKind, DemandState, ManualDemand, ManualLease
+from bench_service.model.manual import DemandKind, DemandState
 from bench_service.wall_clock import now, pause_async
-from procedures.bench import Bench
-from procedures.bench.errors import BenchError, Disconnected, Stopped
-from simulators.world import WorldConfig, build
-from tests.kit.failing_driver import FailingDriver
-
-VALUES: dict[str, dict[str, Any]] = {
-    "supply_on": {"voltage_v": None, "current_a": None},
-    "rate": {"axis": "outer", "rate_deg_s": 5.0, "duration_s": 100.0, "ramp_s": 1.0},
-    "go_to": {"outer_deg": 5.0, "middle_deg": None, "inner_deg": None},
-    "halt": {},
-}
-LONG_S = 20.0
-"""Longest wait for an event; none is waited for in vain."""
-
-
-def a_lease(minutes: float = 5.0) -> ManualLease:
-    at = now()
-    return ManualLease("l1", "sim", "SIM-0001", "ann", False, "a look", at, at + timedelta(minutes=minutes))
-
-
-def a_demand(kind: DemandKind, name: str = "") -> ManualDemand:
-    return ManualDemand(name or kind, "l1", name or kind, kind, VALUES[kind], "ann", now())
-
-
-class Gate:
-    """Keeps a verb of a device from going on until it is let through."""
-
-    def __init__(self, verb: Callable[..., Any]) -> None:
-        self._verb = verb
-        self.entered, self.open = Event(), Event()
-        self.ended = Event()
-
-    async def __call__(self, *arguments: Any) -> Any:
-        self.entered.set()
-        try:
-            while not self.open.is_set():
-                await pause_async(0.005)
-            return await self._verb(*arguments)
-        finally:
-            self.ended.set()
-
-
-class Scene:
-    """A bench with a table that is made safe slowly, the commands that reached it, and the outcomes of demands."""
-
-    def __init__(self) -> None:
-        self.bench: Bench = build(WorldConfig(real_time_factor=20.0, wait=pause_async))
-        self.table = self.bench.turntable
-        self.brake = Gate(self.table.make_safe)
-        setattr(self.table, "make_safe", self.brake)  # noqa: B010
-        self.commanded: list[str] = []
-        for device, verb in ((self.bench.supply, "switch_on"), (self.table, "command_rate"), (self.table, "move_to")):
-            setattr(device, verb, self._noted(verb, getattr(device, verb)))
-        self.outcomes: dict[str, tuple[DemandState, Answer]] = {}
-        self._news = Event()
-
-    def _noted(self, verb: str, work: Callable[..., Any]) -> Callable[..., Any]:
-        async def noted(*arguments: Any) -> Any:
-            self.commanded.append(verb)
-            return await work(*arguments)
-
-        return noted
-
-    def tell(self, demand: ManualDemand, state: DemandState, answer: Answer) -> None:
-        self.outcomes[demand.id] = (state, answer)
-        self._news.set()
-
-    def session(self, lease: ManualLease, **more: Any) -> ManualSession:
-        board = LiveBoard(cast("Any", None), "sim")
-        return ManualSession(lease, self.bench, lambda: False, board, self.tell, **more)
-
-    def over(self, name: str) -> tuple[DemandState, Answer]:
-        """Outcome of a demand, once nothing more becomes of it."""
-        while name not in self.outcomes or not self.outcomes[name][0].over:
-            assert self._news.wait(LONG_S), name
-            self._news.clear()
-        return self.outcomes[name]
+from procedures.bench.errors import Disconnected, Stopped
+from tests.kit.manual_scene import LONG_S, Gate, Scene, a_demand, a_lease, silent
 
 
 @pytest.fixture
@@ -128,7 +44,7 @@ ENDS: dict[str, Callable[[ManualSession], object]] = {
     "a stop": lambda session: session.stop(),
     "a shutdown": lambda session: session.shut_down(),
     "an end": lambda session: session.leave("ended by bob"),
-    "a lost device": lambda session: setattr(session._bench.chamber or session._bench.supply, "read", _silent),
+    "a lost device": lambda session: setattr(session._bench.chamber or session._bench.supply, "read", silent),
     "its time": lambda session: session.expires(replace(session.lease, until=now())),
 }
 WORDS = {
@@ -138,10 +54,6 @@ WORDS = {
     "a lost device": "no answer",
     "its time": "its time has ended",
 }
-
-
-async def _silent() -> None:
-    raise Disconnected("no answer")
 
 
 @pytest.mark.parametrize("end", ENDS)
@@ -239,144 +151,3 @@ def test_no_motion_begins_while_a_halt_brakes_the_table(scene: Scene) -> None:
     assert scene.over("then")[0] is DemandState.DONE
     session.make_safe()
     session.close()
-
-
-class Books:
-    """A lease in memory: what its reader and its runner use of `ManualStore`, and stops of the bench."""
-
-    def __init__(self, lease: ManualLease) -> None:
-        self.lease = lease
-        self.demands: tuple[ManualDemand, ...] = ()
-        self.answers: dict[str, DemandState] = {}
-        self.looks, self.look = 0, Event()
-        self.end_of: tuple[str, bool | None] | None = None
-        self.stops: list[str] = []
-
-    def take(self, lease_id: str, at: Any, process: str) -> ManualLease:
-        return self.lease
-
-    def news(self, lease_id: str) -> LeaseNews:
-        self.looks += 1
-        self.look.set()
-        self.lease = replace(self.lease, heard=self.lease.heard + 1)
-        return LeaseNews(self.lease, "", self.demands)
-
-    def answer(self, demand_id: str, state: DemandState, answer: Answer, at: Any) -> None:
-        self.answers[demand_id] = state
-
-    def end(self, lease_id: str, at: Any, because: str, safe: bool | None) -> None:
-        self.end_of = (because, safe)
-
-    def stop_bench_once(self, stop: Any) -> None:
-        self.stops.append(stop.reason)
-
-    def looked_at(self, times: int = 2) -> None:
-        """Wait until the lease was read again from beginning to end."""
-        wanted = self.looks + times
-        while self.looks < wanted:
-            assert self.look.wait(LONG_S)
-            self.look.clear()
-
-
-def test_a_reader_writes_last_outcomes_when_the_sessions_loop_has_ended(scene: Scene) -> None:
-    session, books = scene.session(a_lease()), Books(a_lease())
-    scene.brake.open.set()
-    session.make_safe()
-    session.close()
-    wake = Event()
-    reader = LeaseReader(cast("ManualStore", books), "l1", wake)
-    session._tell = reader.tell
-    books.demands = (a_demand("supply_on"),)
-    reader.begin(session)
-    reader.tell(a_demand("go_to"), DemandState.DONE, Answer("at rest"))
-    books.looked_at()
-    session.leave("ended by bob")
-    reader.end(LONG_S)
-    assert books.answers == {"go_to": DemandState.DONE, "supply_on": DemandState.STOPPED}
-
-
-def test_a_reader_gives_no_demand_after_its_delivery_has_ended(scene: Scene) -> None:
-    books, given = Books(a_lease()), []
-    session = cast("Any", SimpleNamespace(expires=lambda lease: None, demand=given.append))
-    reader = LeaseReader(cast("ManualStore", books), "l1", Event())
-    reader.end_delivery()
-    books.demands = (a_demand("supply_on"),)
-    reader.begin(session)
-    books.looked_at()
-    reader.tell(a_demand("go_to"), DemandState.DONE, Answer())
-    reader.end(LONG_S)
-    assert (given, books.answers) == ([], {"go_to": DemandState.DONE})
-
-
-class Lab:
-    """A runner on a registered simulated bench whose supply falls silent, and the lease that it runs in a thread."""
-
-    def __init__(self, driver: FailingDriver, books: Books) -> None:
-        self.books, self.trail = books, []
-        stores: Any = SimpleNamespace(manual=books, benches=books)
-        trail: Any = SimpleNamespace(add=self.trail.append)
-        self.runner = ManualRunner(stores, trail, driver, LiveBoard(cast("Any", None), "sim"))
-        self.thread = Thread(target=self.runner.run, args=(books.lease,))
-
-    def noted(self) -> dict[str, Any]:
-        """The detail of `manual_ended` once the lease has ended."""
-        self.thread.join(LONG_S)
-        (entry,) = self.trail
-        return entry.detail
-
-
-def test_a_demand_that_comes_while_a_lost_lease_brakes_is_not_carried_out(tmp_path: Path) -> None:
-    gates: list[Gate] = []
-
-    def change(bench: Bench) -> None:
-        inner = cast("Any", bench).inner
-        inner.chamber.read = _silent
-        gates.append(Gate(inner.turntable.make_safe))
-        inner.turntable.make_safe = gates[0]
-
-    lab = Lab(FailingDriver(tmp_path, change), Books(a_lease()))
-    lab.thread.start()
-    while not gates:
-        lab.books.looked_at(1)
-    assert gates[0].entered.wait(LONG_S)
-    lab.books.demands = (a_demand("supply_on"), a_demand("rate"))
-    lab.runner.wake()
-    lab.books.looked_at(3)
-    gates[0].open.set()
-    assert lab.noted() == {"because": "Disconnected: no answer", "safe": True}
-    state = DeviceRegister(tmp_path, "sim").read()
-    assert state is not None
-    assert state.unsafe == ()
-    journal = (tmp_path / "bench-sim.journal").read_text()
-    assert "supply.make_safe.done" in journal
-    assert "switch_on" not in journal
-    assert "command_rate" not in journal
-    assert lab.books.stops == []
-
-
-class Unsure(FailingDriver):
-    """Its register has the unit as on when a lease has ended, whatever was done; a new link may help or not."""
-
-    helps = True
-
-    def device_state(self) -> DeviceState | None:
-        return DeviceState(powered=True)
-
-    def make_safe(self, by: str) -> Any:
-        if not self.helps:
-            raise BenchError("the supply does not answer")
-
-
-@pytest.mark.parametrize(
-    ("helps", "then"), [(True, "a new link has made it safe since"), (False, "the supply does not answer")]
-)
-def test_a_bench_that_does_not_read_as_safe_is_stopped_and_not_noted_as_safe(
-    tmp_path: Path, helps: bool, then: str
-) -> None:
-    driver = Unsure(tmp_path)
-    driver.helps = helps
-    lab = Lab(driver, Books(replace(a_lease(), end_asked="bob")))
-    lab.thread.start()
-    assert lab.noted() == {"because": "ended by bob", "safe": False}
-    assert lab.books.end_of == ("ended by bob", False)
-    assert lab.books.stops == [f"could not be made safe: at the end of manual mode the unit is on; {then}"]

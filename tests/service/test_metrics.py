@@ -1,4 +1,4 @@
-"""What a monitor scrapes: right for every process of a database, also after a restart, and true to what happened."""
+"""Metrics that a monitor scrapes: right for every process of a database, also after a restart, and true."""
 
 from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings

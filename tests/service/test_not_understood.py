@@ -62,7 +62,7 @@ def test_it_is_refused_listed_without_and_cancelled(stopped: Client, database_ur
 
 
 def test_one_that_was_begun_ends_interrupted_and_leaves_the_bench_to_others(client: Client, database_url: str) -> None:
-    """What a new version finds of a job that an old one began, and the engine goes on with."""
+    """A new version finds a job that an old one began, and the engine continues with it."""
     long = {"dwell_s": 300.0, "settle_s": 0.5}
     foreign = client.submit(parameters=long)["id"]
     client.wait(foreign, "running")

@@ -1,4 +1,4 @@
-"""What a browser may do with our answers: no frame, no script or style in place, no other host; files that it keeps."""
+"""Rights of a browser over our answers: no frame, no script or style in place, no other host; files that it keeps."""
 
 import re
 from collections.abc import Generator

@@ -1,4 +1,4 @@
-"""What outlives the service: a paused job, a wish to pause, a stopped bench."""
+"""States that outlive the service: a paused job, a wish to pause, a stopped bench."""
 
 import json
 import sqlite3

@@ -1,4 +1,4 @@
-"""What a plan is worth before anything moves, and what several calibrations of one unit say together."""
+"""Preview of a plan before anything moves, and what several calibrations of one unit say together."""
 
 from math import sqrt
 

@@ -1,4 +1,4 @@
-"""What is not as it must be is refused in words, by field, value and reason, and leaves nothing behind."""
+"""A wrong request is refused in words, by field, value and reason, and leaves nothing behind."""
 
 import gzip
 import json

@@ -1,4 +1,4 @@
-"""What a key made stays made: the same request again gives it, also where it would be refused by now."""
+"""An idempotency key keeps what it made: the same request again gives it, also where it would be refused by now."""
 
 from typing import Any
 

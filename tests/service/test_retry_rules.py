@@ -31,7 +31,7 @@ def queue(monkeypatch: pytest.MonkeyPatch) -> Queue:
 
 
 def tried(queue: Queue, failure: Failure | None, scale: float = 1.0, **job: int) -> Any:
-    """What the rule makes of a job's failure."""
+    """Answer of the retry rule to a job's failure."""
     given = {"retries": 0, "retries_left": 0, "attempt": 1, **job}
     return retries.try_again(queue, SimpleNamespace(id="a job", **given), failure, scale)  # pyright: ignore[reportArgumentType]
 

@@ -119,7 +119,7 @@ def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Store
 
 
 def test_a_job_that_was_queued_again_while_the_dispatcher_looked_stays_queued(stores: Stores) -> None:
-    """What a recovered workflow does in its own thread: the job first goes back into the queue, then it is done."""
+    """A recovered workflow does so in its own thread: the job first goes back into the queue, then it is done."""
     runner, job = prepared(stores, SimulatedDriver("sim"), lambda: True)
     asked = Event()
 

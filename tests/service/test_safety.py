@@ -1,4 +1,4 @@
-"""What a stop and a release say, over HTTP: with the worker alive, dead, elsewhere; and who sees to the bench."""
+"""Answers to a stop and a release, over HTTP: with the worker alive, dead, elsewhere; and who sees to the bench."""
 
 from collections.abc import Generator
 from dataclasses import replace

@@ -85,7 +85,7 @@ def test_a_full_disk_without_a_free_inode_takes_a_stop(small_disk: Path) -> None
 
 
 def test_where_the_file_cannot_be_written_the_socket_carries_the_word(tmp_path: Path) -> None:
-    """What a file system that copies on write does when it is full: here there is no file at all."""
+    """A file system that copies on write behaves so when it is full: here there is no file at all."""
     worker, asking = StopChannel(tmp_path, "sim"), StopChannel(tmp_path, "sim")
     listening = worker.listen(WORKER)
     assert listening is not None

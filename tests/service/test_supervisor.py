@@ -158,7 +158,7 @@ def test_a_device_whose_link_is_lost_keeps_the_bench_stopped_and_is_made_safe_on
 def test_a_worker_that_could_not_reach_a_device_is_not_killed_and_its_stopped_bench_tried_again(
     tmp_path: Path, worker: subprocess.Popen[bytes]
 ) -> None:
-    """What a worker does: it takes the link, fails, gives the link back, stops the bench, and lives."""
+    """A worker does so: it takes the link, fails, gives the link back, stops the bench, and lives."""
     register, books, lease = abandoned(tmp_path, "job-1"), Books(), Lease()
     devices = RegisteredDevices(register)
     register.cables.cut("turntable", "")

@@ -1,4 +1,4 @@
-"""What the supervisor does about a stop in the channel and about a heartbeat that is missing, look by look."""
+"""Acts of the supervisor about a stop in the channel and about a heartbeat that is missing, look by look."""
 
 import subprocess
 from pathlib import Path

@@ -38,7 +38,7 @@ def stage_one(client: Client) -> dict:
 
 
 def truth_correction(first_stage: ConverterTriad | None) -> ThermalCorrection:
-    """What a cycle would find of the default unit, exactly."""
+    """Correction that a cycle would find of the default unit, exactly."""
     unit = default_unit()
     case, board = (REFERENCE_C + t.offset_c for t in unit.thermal.thermometers[:2])
     axes = []
@@ -111,7 +111,7 @@ def test_a_calibration_at_any_temperature_finds_the_unit_at_the_reference(
 
 
 def errors(result: dict, true: np.ndarray) -> np.ndarray:
-    """Of the accelerometers' twelve coefficients, in their own standard uncertainties."""
+    """Errors of the accelerometers' twelve coefficients, in their own standard uncertainties."""
     found = result["document"]["triads"][1]["coefficients"]
     estimate, sd = (np.array([c[name] for c in found]) for name in ("estimate", "standard_uncertainty"))
     return (estimate - true) / sd

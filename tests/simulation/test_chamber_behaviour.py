@@ -1,4 +1,4 @@
-"""What temperature does to the outputs, by hand; and that the defaults are of the size that the thesis prints."""
+"""Effects of temperature on the outputs, by hand; and that the defaults are of the size that the thesis prints."""
 
 import numpy as np
 import pytest

@@ -35,7 +35,7 @@ SENSORS = ("case", "converter", "gyro_x", "gyro_y", "gyro_z")
 
 @dataclass
 class Run:
-    """What came of a station."""
+    """Outcome of one station."""
 
     bench: SimulatedBench
     stream: Stream

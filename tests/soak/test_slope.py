@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.soak.__main__ import LEVEL_MB, judged
+from tests.soak.level import LEVEL_MB, judged
 from tests.soak.slope import Slope, slope
 
 MINUTES = np.arange(45.0)

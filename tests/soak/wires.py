@@ -33,7 +33,7 @@ from tests.benchmarks.process import free_port
 from tests.conformance.served import served
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.wired_bench import THERMAL_LANGUAGES, bench_file
-from tests.soak.__main__ import GROWN, LEVEL_MB, Samples
+from tests.soak.level import LEVEL_MB, Samples, judged_counts
 from tests.soak.slope import slope
 from tests.soak.wire_faults import Faults
 from tests.soak.wire_journal import Journal
@@ -162,13 +162,8 @@ def checked_recordings(load: WiredLoad, client: httpx.Client, journal: Journal) 
 
 def level(samples: Samples, minutes: float) -> list[str]:
     """Print the service's figures; a sentence for each that grows."""
-    wrong: list[str] = []
+    wrong = judged_counts(samples)
     times, late = np.array(samples.minutes), np.array(samples.minutes) >= minutes / 4.0
-    for name, counts in (("descriptors", samples.descriptors), ("threads", samples.threads)):
-        quarters = [int(q.max()) for q in np.array_split(np.array(counts), 4)]
-        print(f"{name}: {', '.join(map(str, quarters))} at most in each quarter")
-        if quarters[3] > quarters[1] + GROWN:
-            wrong.append(f"{name} grow: {quarters}")
     memory = np.array(samples.memory_mb)
     quarters = [float(q.mean()) for q in np.array_split(memory, 4)]
     print(f"memory: {', '.join(f'{q:.1f}' for q in quarters)} MB by quarter, {memory.max():.0f} MB at most")

@@ -1,4 +1,4 @@
-"""What goes out can be read back: the same samples, and all that is needed to understand them."""
+"""Exported samples can be read back: the same samples, and all that is needed to understand them."""
 
 import io
 from collections.abc import Callable, Iterator

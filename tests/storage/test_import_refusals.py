@@ -1,4 +1,4 @@
-"""What does not fit is refused with the file, the row and what was expected; what leaves something open, beforehand."""
+"""Refusals of an import name the file, the row and what was expected; what leaves something open, beforehand."""
 
 import gzip
 import io

@@ -1,4 +1,4 @@
-"""What benches do now: one row each, and what the absence of a word means."""
+"""Present states of benches: one row each, and what the absence of a word means."""
 
 from datetime import timedelta
 

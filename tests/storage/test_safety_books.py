@@ -1,4 +1,4 @@
-"""What a supervisor reads and writes, on both databases, and who else sees it."""
+"""Rows that a supervisor reads and writes, on both databases, and who else sees it."""
 
 import sqlalchemy as sa
 

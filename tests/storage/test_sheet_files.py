@@ -54,7 +54,7 @@ def test_each_reader_finds_time_and_si_values_under_names_with_units(form: Sheet
 
 @pytest.mark.parametrize("form", ["csv", "parquet", "arrow", "feather"])
 def test_polars_and_duckdb_read_the_same_without_an_option(form: str, tmp_path: Path) -> None:
-    """Of the Arrow formats duckdb reads what polars or pyarrow opened: it has no reader of their files."""
+    """In the Arrow formats duckdb reads what polars or pyarrow opened: it has no reader of their files."""
     import duckdb
     import polars as pl
 

@@ -41,7 +41,7 @@ def least(seeds: int) -> int:
 
 
 def ended(found: Course) -> Ended:
-    """What became of a run."""
+    """Verdict of a run, and all that failed."""
     return (found.run.verdict or Verdict.ERROR).value, told(found.run)
 
 

@@ -42,7 +42,7 @@ _SIZES = (1, 4, 16, 64, COUNT // 8, COUNT // 4)
 
 @dataclass(frozen=True)
 class Coverage:
-    """Of one noise, member and cluster size."""
+    """Coverage of one noise, member and cluster size."""
 
     alpha: int
     statistic: str

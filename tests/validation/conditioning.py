@@ -74,7 +74,7 @@ def wavelet(share: float, console: Console) -> Iterator[str]:
 
 
 def _judged(r: Reading, raw: Reading) -> Iterator[str]:
-    """What `SENTENCE` says of one way to split, each at `SIGMAS` standard errors of paired differences."""
+    """Judgement by `SENTENCE` of one way to split, each at `SIGMAS` standard errors of paired differences."""
     name = f"{r.rate_hz:g} Hz, {r.split.name}"
     if r.split.rule is None:
         error = np.std(r.at, ddof=1) / np.sqrt(len(r.at))

@@ -18,7 +18,7 @@ PLATEAU_S = 300
 
 @dataclass(frozen=True)
 class Alarms:
-    """Of stationary records."""
+    """False alarms of stationary records."""
 
     channel: Channel
     records: int
@@ -38,7 +38,7 @@ def alarms(channel: Channel, records: int) -> Alarms:
 
 @dataclass(frozen=True)
 class Ends:
-    """Of one curve in one channel's noise."""
+    """Ends of one curve in one channel's noise."""
 
     channel: Channel
     curve: Curve
@@ -73,7 +73,7 @@ def ends(channel: Channel, curve: Curve, levels: float, records: int) -> Ends:
 
 @dataclass(frozen=True)
 class Heatings:
-    """Of one injected curve [µg, 1/s] in an accelerometer's noise."""
+    """Fits of one injected curve [µg, 1/s] in an accelerometer's noise."""
 
     true: tuple[float, ...]
     fits: tuple[SelfHeating, ...]

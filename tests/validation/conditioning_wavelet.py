@@ -83,5 +83,5 @@ def _kept(cells: Array, rate_hz: float, split: Split) -> Array:
 
 
 def raw_theory() -> float:
-    """What the raw line reads at `READ_AT_S` [deg/√h]: all of σ² taken for N²/τ."""
+    """Value of the raw line at `READ_AT_S` [deg/√h]: all of σ² taken for N²/τ."""
     return float(np.sqrt(allan_variance(SYNTHETIC.noise, READ_AT_S) * READ_AT_S)) / 60.0

@@ -34,7 +34,7 @@ PROCESSES = ("quantization", "random_walk", "bias_instability", "rate_random_wal
 
 @dataclass(frozen=True)
 class Claim:
-    """What one record got."""
+    """Claims about one record."""
 
     holds: dict[str, bool]
     """Of each process: the truth lies in the interval, or below the limit where none is given."""
@@ -66,7 +66,7 @@ def analysed(record: Record) -> Any:
 
 
 def claim(record: Record) -> Claim:
-    """What is claimed, and whether it holds."""
+    """Claim about a record, and whether it holds."""
     try:
         result = analysed(record)
     except DomainError:

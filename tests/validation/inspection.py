@@ -84,7 +84,7 @@ def _wrong(fault: Fault, f: Finding) -> str:
 
 
 def named(record: Record) -> str:
-    """What is said of a sound recording; a coarse resolution is true and no fault."""
+    """Findings about a sound recording; a coarse resolution is true and no fault."""
     return "; ".join(f.sentence for fs in inspected(record).values() for f in fs if f.kind.value != "resolution")
 
 

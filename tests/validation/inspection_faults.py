@@ -110,7 +110,7 @@ def temperature_wraps(rng: Rng) -> Fault:
 
 
 def steps(rng: Rng) -> Fault:
-    """Of 1 … 30 standard deviations of a sample, on white or low-passed noise."""
+    """Steps of 1 … 30 standard deviations of a sample, on white or low-passed noise."""
     record, c = counts(rng, ("white", "low-passed")[int(rng.integers(2))], least_sd=4.0), int(rng.integers(6))
     x, n = record.samples.copy(), len(record.samples)
     at = int(rng.uniform(0.15, 0.85) * n)

@@ -58,12 +58,12 @@ class Check:
 
 
 def variance_limits(degrees: float) -> tuple[float, float]:
-    """Of a mean square with so many degrees of freedom, relative to its expectation."""
+    """Limits of a mean square with so many degrees of freedom, relative to its expectation."""
     return float(chi2.ppf(LEVEL / 2, degrees) / degrees), float(chi2.isf(LEVEL / 2, degrees) / degrees)
 
 
 def spread_limits(units: int) -> tuple[float, float]:
-    """Of a sample standard deviation of so many, relative to the true one."""
+    """Limits of a sample standard deviation of so many, relative to the true one."""
     low, high = np.sqrt(variance_limits(units - 1))
     return float(low), float(high)
 
@@ -119,7 +119,7 @@ def _of_triad(p: Outcome, i: int, triad: str) -> list[Check]:
 
 @dataclass(frozen=True)
 class Misdeclared:
-    """What comes of a triad on tables that are not as declared; the worst and the best of its twelve coefficients."""
+    """Outcome of a triad on tables that are not as declared; the worst and the best of its twelve coefficients."""
 
     triad: str
     detected: float

@@ -1,4 +1,4 @@
-"""What a broken calibration looks like, drawn at random: is it refused or failed, and does a clean one pass?
+"""Misfits of a broken calibration, drawn at random: is it refused or failed, and does a clean one pass?
 
 ``python -m tests.validation.misfit [--draws N] [--coverage N]`` (``make validate``). The generator knows nothing of the
 product: rotations by quaternions, noise by its own recursions. Exit code 1 where a broken input passes without a word,

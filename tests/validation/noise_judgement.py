@@ -27,7 +27,7 @@ Answer = dict[str, Values]
 
 
 def from_fit(fit: NoiseFit) -> Answer:
-    """What (b) or (c) said."""
+    """Judgement of a fit, way (b) or (c)."""
     answer: Answer = {}
     for process in PROCESSES:
         e = fit.of(process)
@@ -38,7 +38,7 @@ def from_fit(fit: NoiseFit) -> Answer:
 
 
 def from_read_off(lines: ReadOff) -> Answer:
-    """What (a) said; it has neither interval nor limit."""
+    """Judgement of the read-off, way (a); it has neither interval nor limit."""
     answer: Answer = {}
     for process in PROCESSES:
         line = getattr(lines, process)

@@ -126,7 +126,7 @@ def density(scenario: Scenario, f: Array, period_s: float) -> tuple[list[str], A
 
 
 def _continuous(process: str, f: Array) -> Array:
-    """Of unit B² or K²."""
+    """Spectral density of a continuous process of unit B² or K²."""
     if process == "rate_random_walk":
         return 1.0 / (2.0 * pi * f) ** 2
     turns = 2.0 * pi * f

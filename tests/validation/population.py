@@ -86,7 +86,7 @@ MISDECLARED = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one unit, or of many with one more axis in front. 24: coefficients of both triads; 2: triads."""
+    """Outcome of one unit, or of many with one more axis in front. 24: coefficients of both triads; 2: triads."""
 
     errors: Array
     """Estimates minus the launch's truth, (24,)."""
@@ -117,7 +117,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Plans:
-    """What is the same for every unit of a scenario: stations, their plans for both triads, and the reference."""
+    """Plans that every unit of a scenario has: stations, their plans for both triads, and the reference."""
 
     calibration: tuple[Station, ...]
     verification: tuple[Station, ...]
@@ -216,7 +216,7 @@ def recordings(config: WorldConfig, stations: Sequence[Station], launch: int) ->
 
 
 def table_uncertainty(bench: BenchDescription) -> TableUncertainty:
-    """What a bench declares, as the analysis takes it."""
+    """Uncertainty that a bench declares, as the analysis takes it."""
     a = bench.accuracy
     sds = (a.orthogonality_sd_arcsec, a.pointing_sd_arcsec, a.level_sd_arcsec, bench.site.azimuth_sd_arcsec)
     return TableUncertainty(*sds, bench.site.gravity_sd_m_s2 / bench.site.gravity_m_s2)

@@ -43,7 +43,7 @@ LEVEL = 1e-3 / 24
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one unit: errors and claims of `NAMES`, preview of gain and delay, p-value; nan for what was not told."""
+    """Outcome of one unit: errors and claims of `NAMES`, preview of gain and delay, p-value; nan: not told."""
 
     errors: np.ndarray
     claimed: np.ndarray
@@ -122,14 +122,14 @@ def show(title: str, outcomes: Sequence[Outcome], scatters: bool, lags: bool, co
         found += [f"{title}: the delay is not Student's t, KS p {student:.3g}"] if student < LEVEL else []
     if not scatters and p < LEVEL:
         found.append(f"{title}: p-values are not uniform, KS p {p:.3g}")
-    if not scatters and shown > chi2_most(n, 1e-3):
+    if not scatters and shown > binomial_most(n, 1e-3):
         found.append(f"{title}: a scatter of the stamps is told of {shown} units, and none was put in")
-    if misses > chi2_most(n, 0.05):
+    if misses > binomial_most(n, 0.05):
         found.append(f"{title}: the true bandwidth is below its limit {misses} times")
     return found
 
 
-def chi2_most(n: int, share: float) -> int:
+def binomial_most(n: int, share: float) -> int:
     """Largest number of n trials, each successful with this chance, that chance alone makes likely (`LEVEL`)."""
     return int(binom.isf(LEVEL, n, share))
 

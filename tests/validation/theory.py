@@ -1,4 +1,4 @@
-"""What theory allows: noise of the dwells, flaws of the table, and the bounds that follow.
+"""Bounds that theory allows: noise of the dwells, flaws of the table, and the bounds that follow.
 
 Written from the truth alone, without the analysis that it judges: the covariance of the dwells from the very processes
 that the simulated unit is made of, the flaws as differences of true attitudes.
@@ -25,7 +25,7 @@ AXES = 3
 
 @dataclass(frozen=True)
 class Reference:
-    """What the two triads see at the stations, gyros first, and how each flaw of the table at one sd changes it."""
+    """Reference of the two triads at the stations, gyros first, and how each flaw of the table at one sd changes it."""
 
     vectors: tuple[Array, Array]
     """On an ideal table, each (n, 3)."""
@@ -120,7 +120,7 @@ def _axes_deg(stations: Sequence[Station]) -> Array:
 
 
 def bounds(seen: Reference, noise: tuple[Array, Array], matrices: tuple[Array, Array]) -> Bounds:
-    """Of ``U = b + K·v + n`` for covariances (3, n, n) of the dwells and the true K of both triads."""
+    """Bounds of ``U = b + K·v + n`` for covariances (3, n, n) of the dwells and the true K of both triads."""
     designs = [np.column_stack([np.ones(len(v)), v]) for v in seen.vectors for _ in range(AXES)]
     covariances = [c for of_triad in noise for c in of_triad]
     flaws = [f for k, dv in zip(matrices, seen.flaws, strict=True) for f in np.einsum("cj,njp->cnp", k, dv)]

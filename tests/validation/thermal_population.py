@@ -102,7 +102,7 @@ def population(count: int, workers: int = 1) -> Iterator[Outcome]:
 
 @dataclass(frozen=True)
 class Worth:
-    """What a correction is worth on a cycle that it was not fitted to."""
+    """Worth of a correction on a cycle that it was not fitted to."""
 
     before: dict[float, Array]
     """Soak -> root mean square over the three runs of 3σ before, (3,) [m/s²]."""

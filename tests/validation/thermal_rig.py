@@ -47,7 +47,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Cycle:
-    """What one run gives, one sample a second."""
+    """Samples of one run, one a second."""
 
     up: int
     nodes_c: Array
@@ -151,7 +151,7 @@ def as_run(
     settings: RegimeSettings | None = None,
     cell_s: float = 60.0,
 ) -> ThermalRun:
-    """What the analysis would be given: outputs, thermometers, and the data sheet's time constants of these."""
+    """Run as the analysis would be given it: outputs, thermometers, and the data sheet's time constants of these."""
     case, converter = run.codes[:, 0], run.codes[:, 1]
     lag = {"case": LAG_S, "converter": LAG_S}
     series = {"output": output, "case": case, "converter": converter}
@@ -159,7 +159,7 @@ def as_run(
 
 
 def reference_c(truth: UnitThermalTruth) -> tuple[float, float]:
-    """What case and converter sensor read with the nodes at the reference."""
+    """Readings of case and converter sensor with the nodes at the reference."""
     return REFERENCE_C + truth.thermometers[0].offset_c, REFERENCE_C + truth.thermometers[1].offset_c
 
 

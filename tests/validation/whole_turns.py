@@ -55,7 +55,7 @@ EVEN_PPM = (40.0, -30.0, 20.0), (-25.0, 15.0, 30.0)
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one unit: errors, claims and preview of the coefficients (k,), chi-square over its degrees, p-value."""
+    """Outcome of one unit: errors, claims, preview of the coefficients (k,), chi-square over its degrees, p-value."""
 
     errors: Array
     claimed: Array

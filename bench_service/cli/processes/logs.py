@@ -21,7 +21,7 @@ OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")
 
 
 FILE_BYTES, FILES_KEPT = 10_000_000, 5
-"""Length at which a log file is begun again, and how many older ones are kept."""
+"""Length at which a log file is rotated, and number of older ones that are kept."""
 TRACE = "    | "
 """Prefix of each line of a traceback: a message with a line break in it cannot look like a line of the log."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")

@@ -1,6 +1,6 @@
 """Description of a bench from its file: limits, accuracy, site, and its devices with their certificates."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from bench_service.drivers.bench_file.document import BenchFile
@@ -100,24 +100,24 @@ def _cause(file: BenchFile, table: TurntableSection) -> str:
 
 def _way_out(file: BenchFile, table: TurntableSection) -> str:
     """The largest time factor that lets whole turns run, or, at that of real devices, the longest pause; or nothing."""
-    factor, pause_s = file.time_factor, getattr(table, AFTER_DEMAND, None)
-    if factor > 1.0 and (factors := [f for f in _tenths(1.0, factor) if table.turn_extra_s(f) <= MOST_TURN_EXTRA_S]):
-        return f"; a factor of at most {max(factors):g} lets them run"
+    factor = _largest(1.0, file.time_factor, table.turn_extra_s)
+    if factor is not None:
+        return f"; a factor of at most {factor:g} lets them run"
+
+    def extra_s(after_demand_s: float) -> float:
+        return table.model_copy(update={AFTER_DEMAND: after_demand_s}).turn_extra_s(file.time_factor)
+
+    pause_s = _largest(0.0, getattr(table, AFTER_DEMAND, 0.0), extra_s)
     if pause_s is None:
         return ""
-    pauses = [
-        s
-        for s in _tenths(0.0, pause_s)
-        if table.model_copy(update={AFTER_DEMAND: s}).turn_extra_s(factor) <= MOST_TURN_EXTRA_S
-    ]
-    if not pauses:
-        return ""
-    most = f"turntable.{AFTER_DEMAND} of at most {max(pauses):g} s"
+    most = f"turntable.{AFTER_DEMAND} of at most {pause_s:g} s"
     return f"; {most} lets them run, where the controller takes demands so fast"
 
 
-def _tenths(first: float, end: float) -> list[float]:
-    return [n / 10.0 for n in range(round(10.0 * first), round(10.0 * end))]
+def _largest(least: float, below: float, extra_s: Callable[[float], float]) -> float | None:
+    """Largest setting, in tenths, at which the table's demands for whole turns take no longer than they may."""
+    tenths = range(round(10.0 * below) - 1, round(10.0 * least) - 1, -1)
+    return next((tenth / 10.0 for tenth in tenths if extra_s(tenth / 10.0) <= MOST_TURN_EXTRA_S), None)
 
 
 def _no_thermal_jobs(file: BenchFile) -> str:

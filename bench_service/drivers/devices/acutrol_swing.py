@@ -26,6 +26,9 @@ BEYOND, LEAST = 1.3, 0.5
 TURNING = 5.0
 """Rates of rest that an axis must gain within the readings that make rest, so that no turning point looks like it."""
 
+BACK_S = 1.0
+"""Planned time of the way back to where a sinusoid began [s]."""
+
 
 class SwingingTable(WatchedTable):
     """Table whose sinusoids are begun in the synthesizer's mode and ended by braking in rate mode."""
@@ -74,7 +77,7 @@ class SwingingTable(WatchedTable):
 
     async def _swing(self, sinusoid: Sinusoid, index: int, start: list[float], demand: int, begun_s: float) -> None:
         """Trace an axis until its cycles are over, then brake it and lead it back to its start."""
-        try:
+        async with self._followed(index, demand):
             largest = readings = 0.0
             while self._clock.now_s() < begun_s + sinusoid.duration_s:
                 self._require_current(demand)
@@ -87,15 +90,10 @@ class SwingingTable(WatchedTable):
             self._require_current(demand)
             await self._stop_at_rate(index)
             await self._wait_for_rest(None, sinusoid.rate_deg_s / self._axes()[index].acceleration_deg_s2, demand)
-            await self._lead_back(index, start, demand)
+            await self._lead(index, start[index], start, BACK_S, demand)
             if largest < LEAST * sinusoid.amplitude_deg:
                 wanted = f"{sinusoid.amplitude_deg:g} deg"
                 raise DeviceFault(f"the {sinusoid.axis} axis swung by {largest:.4g} deg where {wanted} were demanded")
-        except BaseException as failure:
-            await self._stop_unfollowed(index, demand, failure)
-            raise
-        finally:
-            self._end(demand)
 
     async def _reading(self, index: int) -> AxisState:
         """Read the axes, and keep the reading with the interval of its question."""
@@ -115,12 +113,3 @@ class SwingingTable(WatchedTable):
                 f"{sinusoid.amplitude_deg:g} deg began: the controller does not swing as this driver takes it to"
             )
         return distance_deg
-
-    async def _lead_back(self, index: int, start: list[float], demand: int) -> None:
-        """Lead the axis that has swung back to its start, and wait until all axes stand where they did."""
-        axis = self._axes()[index]
-        self._require_current(demand)
-        await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-        await self._link.demand("position", index, self._demanded(index, start[index], start[index]))
-        await self._link.mode("position", [index])
-        await self._wait_for_rest(start, 1.0, demand)

@@ -187,7 +187,7 @@ class AcutrolTurntable(SwingingTable):
 
     async def _follow(self, turn: Turn, index: int, start: list[float], demand: int) -> None:
         """Count the turns of an axis in rate mode, stop it before their end, and lead it to the angle of the start."""
-        try:
+        async with self._followed(index, demand):
             sign = 1.0 if turn.turns > 0 else -1.0
             progress = TurnProgress(start[index], sign * turn.rate_deg_s, self._clock.now_s())
             stopped = await self._stop_after(progress, index, turn.angle_deg, turn.ramp_s, demand)
@@ -197,26 +197,16 @@ class AcutrolTurntable(SwingingTable):
             states = await self._states()
             progress.read(states[index].position_deg, rested, not_turned)
             await self._return(turn, index, start, turn.angle_deg - progress.turned_deg, demand)
-        except BaseException as failure:
-            await self._stop_unfollowed(index, demand, failure)
-            raise
-        finally:
-            self._end(demand)
 
     async def _follow_rate(self, rate: ConstantRate, index: int, start: list[float], demand: int) -> None:
         """End a rate once its angle is covered, and hold the axis where it comes to rest."""
-        try:
+        async with self._followed(index, demand):
             progress = TurnProgress(start[index], rate.rate_deg_s, self._clock.now_s())
             await self._stop_after(progress, index, rate.angle_deg, rate.ramp_s, demand)
             await self._wait_for_rest(None, rate.ramp_s, demand)
             self._require_current(demand)
             await self._link.demand("position", index, (await self._link.states())[index].position_deg)
             await self._link.mode("position", [index])
-        except BaseException as failure:
-            await self._stop_unfollowed(index, demand, failure)
-            raise
-        finally:
-            self._end(demand)
 
     async def _stop_after(
         self, progress: TurnProgress, index: int, angle_deg: float, ramp_s: float, demand: int
@@ -240,12 +230,9 @@ class AcutrolTurntable(SwingingTable):
         axis, here = self._axes()[index], (await self._states())[index].position_deg
         if abs(left_deg) > MOST_LEFT_DEG:
             raise DeviceFault(f"the {turn.axis} axis stopped {left_deg:g} deg before the end of its turns")
-        end = here + left_deg
-        await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-        await self._link.demand("position", index, self._demanded(index, end, here))
-        await self._link.mode("position", [index])
-        ends = [end if k == index else angle for k, angle in enumerate(start)]
-        await self._wait_for_rest(ends, _duration_s(abs(left_deg), axis.rate_deg_s, axis.acceleration_deg_s2), demand)
+        ends = [here + left_deg if k == index else angle for k, angle in enumerate(start)]
+        longest = _duration_s(abs(left_deg), axis.rate_deg_s, axis.acceleration_deg_s2)
+        await self._lead(index, here, ends, longest, demand)
 
 
 def _moves_on(mode: str) -> bool:

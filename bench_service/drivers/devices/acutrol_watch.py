@@ -2,6 +2,8 @@
 
 import asyncio
 import logging
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
 
 from bench_service.drivers.devices.acutrol_link import AcutrolLink, AcutrolSection
 from bench_service.drivers.devices.table_axes import AXES, TurnCount, declared, wrapped
@@ -136,6 +138,17 @@ class WatchedTable:
         await self._link.demand("rate", index, 0.0)
         await self._link.mode("rate", [index])
 
+    @asynccontextmanager
+    async def _followed(self, index: int, demand: int) -> AsyncGenerator[None]:
+        """Brake the axis where the block that follows its motion fails or is cancelled; end its demand in any case."""
+        try:
+            yield
+        except BaseException as failure:
+            await self._stop_unfollowed(index, demand, failure)
+            raise
+        finally:
+            self._end(demand)
+
     async def _stop_unfollowed(self, index: int, demand: int, failure: BaseException) -> None:
         """Brake an axis that is not followed any more, unless another demand took over, which stops it by itself.
 
@@ -153,6 +166,15 @@ class WatchedTable:
             if isinstance(failure, Exception) and not isinstance(failure, Stopped):
                 kind = Disconnected if isinstance(error, Disconnected) else DeviceFault
                 raise kind(f"{failure}; {text}") from error
+
+    async def _lead(self, index: int, here_deg: float, ends: list[float], longest_s: float, demand: int) -> None:
+        """Lead an axis, which reads `here_deg`, to its end, and wait until all axes rest at theirs."""
+        axis = self._axes()[index]
+        self._require_current(demand)
+        await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+        await self._link.demand("position", index, self._demanded(index, ends[index], here_deg))
+        await self._link.mode("position", [index])
+        await self._wait_for_rest(ends, longest_s, demand)
 
     def _demanded(self, index: int, angle_deg: float, here_deg: float) -> float:
         """Angle as the controller takes it, for an axis that reads `here_deg`: of one turn where its encoder is so.

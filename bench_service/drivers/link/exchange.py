@@ -62,7 +62,7 @@ class Greeting(Protocol):
 
     @property
     def identity(self) -> Question[Any]:
-        """Request of the identity; its `read` refuses the answer to any other request."""
+        """Request for the identity; its `read` refuses the answer to any other request."""
         ...
 
     def check(self, identity: Any, ask: "Ask") -> None:

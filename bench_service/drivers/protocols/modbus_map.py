@@ -21,7 +21,7 @@ class Register(BaseModel):
     type: Literal["float32", "int16", "uint16", "int32"] = "float32"
     table: Literal["holding", "input"] = "holding"
     word_order: Literal["big", "little"] = "big"
-    """Register that comes first of two: "big" the more significant one."""
+    """Order of the two registers of a number: "big" has the more significant one first."""
     byte_order: Literal["big", "little"] = "big"
     """Order of the two bytes in a register; "big" is the standard's."""
     scale: float = Field(default=1.0, gt=0.0, lt=1e9)

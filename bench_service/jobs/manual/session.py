@@ -2,25 +2,21 @@
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
 from math import inf
-from typing import Any
 
 from bench_service.bench.driven import STOPPED, UNWIND_S, DrivenBench
 from bench_service.bench.live.devices import DeviceReadings
 from bench_service.bench.live.values import PUBLISH_S, BenchLive, LiveBoard, LiveManual
-from bench_service.jobs.manual.demands import angles, constant_rate
 from bench_service.jobs.manual.sensors import UnitReadings
+from bench_service.jobs.manual.work import TICK_S, DemandWork
 from bench_service.model.manual import MOTIONS, Answer, DemandState, ManualDemand, ManualLease
 from bench_service.wall_clock import monotonic_at_s, monotonic_s, now, pause_async
 from procedures.bench import Bench
 from procedures.bench.errors import BenchError, Disconnected, OutOfRange, Stopped
 from procedures.core.errors import BadParameter
 
-TICK_S = 0.1
-"""Time that passes between two looks at the lease, of bench and real time alike [s]."""
 TIME_OVER, LEFT = "its time has ended", "the bench is being made safe"
 
 log = logging.getLogger(__name__)
@@ -49,6 +45,7 @@ class ManualSession(DrivenBench):
         self._board, self._tell = board, tell
         self._readings = DeviceReadings(self._bench)
         self._sensors = UnitReadings(bench)
+        self._work = DemandWork(self._bench, self._sensors, self._leave_motion)
         self._over = asyncio.Event()
         self._until_s = monotonic_at_s(lease.until)
         self._publish_s = -inf
@@ -56,11 +53,8 @@ class ManualSession(DrivenBench):
         """The reason why no demand begins any more; empty: demands begin."""
         self._seen: set[str] = set()
         self._begun: set[str] = set()
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._motion: asyncio.Task[None] | None = None
-        self._doing = ""
-        self._halts = 0  # under way: no motion begins meanwhile
-        self._order = asyncio.Lock()
+        self._tasks: dict[asyncio.Task[None], ManualDemand] = {}
+        """Demands under way, by their tasks."""
         self._failure: BenchError | None = None
 
     def hold(self) -> None:
@@ -132,7 +126,7 @@ class ManualSession(DrivenBench):
         for task in self._tasks:
             task.cancel()
         if self._tasks:
-            _, left = await asyncio.wait(self._tasks, timeout=UNWIND_S)
+            _, left = await asyncio.wait([*self._tasks], timeout=UNWIND_S)
             if left:
                 log.error("%s: %d demands could not be left within %g s", self._name, len(left), UNWIND_S)
 
@@ -142,28 +136,35 @@ class ManualSession(DrivenBench):
 
     async def _pass(self) -> None:
         """Let some time pass, in the bench's clock unless a motion does that already."""
-        if self._moving():
+        if self._motion() is not None:
             await pause_async(TICK_S)
         else:
-            await self._time_passes(TICK_S)
+            await self._work.time_passes(TICK_S)
 
-    async def _time_passes(self, seconds: float) -> None:
-        """Let time pass in the bench's clock; with a unit that has power, while its samples are read."""
-        if not await self._sensors.read(seconds):
-            await self._bench.clock.sleep(seconds)
+    def _motion(self) -> asyncio.Task[None] | None:
+        """The motion under way; there is one at most."""
+        return next((task for task, one in self._tasks.items() if one.kind in MOTIONS and not task.done()), None)
 
-    def _moving(self) -> bool:
-        return self._motion is not None and not self._motion.done()
+    async def _leave_motion(self) -> None:
+        """Leave the motion under way, for a halt; it is waited for no longer than work takes to unwind."""
+        if (motion := self._motion()) is not None:
+            motion.cancel()
+            await asyncio.wait([motion], timeout=UNWIND_S)
 
     async def _publish(self) -> None:
         devices = await self._readings.read()
         self._sensors.powered(devices.unit_on)
-        lease, sensors = self.lease, self._sensors
+        lease, sensors, motion = self.lease, self._sensors, self._motion()
         manual = LiveManual(
-            *(lease.id, lease.holder, lease.reason, lease.until),
+            lease.id,
+            lease.holder,
+            lease.reason,
+            lease.until,
             self._bench.clock.now_s(),
-            self._doing if self._moving() else "",
-            *(sensors.values, sensors.at_s, sensors.problem),
+            "" if motion is None else self._tasks[motion].kind,
+            sensors.values,
+            sensors.at_s,
+            sensors.problem,
         )
         self._board.publish(BenchLive(lease.bench, now(), devices=devices, manual=manual))
 
@@ -179,24 +180,21 @@ class ManualSession(DrivenBench):
         if self._ended_because:
             self._not_begun(demand)
             return
-        moves = demand.kind in MOTIONS
-        if moves and (refusal := self._motion_refusal(demand)) is not None:
+        if demand.kind in MOTIONS and (refusal := self._motion_refusal(demand)) is not None:
             self._tell(demand, DemandState.REFUSED, refusal)
             return
         task = self._loop.create_task(self._do(demand))
-        self._tasks.add(task)
-        task.add_done_callback(partial(self._over_with, demand))
-        self._halts += demand.kind == "halt"
-        if moves:
-            self._motion, self._doing = task, demand.kind
+        self._tasks[task] = demand
+        task.add_done_callback(self._over_with)
 
     def _motion_refusal(self, demand: ManualDemand) -> Answer | None:
         """The refusal of a motion that would begin beside another, or while a halt brakes the table; None: it may."""
-        if self._halts:
+        if any(one.kind == "halt" for one in self._tasks.values()):
             text = "a halt is under way: wait until it is done and the table rests"
             return Answer(text, "kind", demand.kind, "a motion after the halt")
-        if self._moving():
-            text = f"the table is moving ({self._doing}): halt it, or wait for its end; one motion at a time"
+        if (motion := self._motion()) is not None:
+            doing = self._tasks[motion].kind
+            text = f"the table is moving ({doing}): halt it, or wait for its end; one motion at a time"
             return Answer(text, "kind", demand.kind, "halt")
         return None
 
@@ -204,10 +202,9 @@ class ManualSession(DrivenBench):
         text = f"the lease has ended: {self._ended_because or LEFT}; nothing was commanded"
         self._tell(demand, DemandState.STOPPED, Answer(text))
 
-    def _over_with(self, demand: ManualDemand, task: "asyncio.Task[None]") -> None:
+    def _over_with(self, task: "asyncio.Task[None]") -> None:
         """Forget a task that is over; one that was cancelled before its first step has not said so itself."""
-        self._tasks.discard(task)
-        self._halts -= demand.kind == "halt"
+        demand = self._tasks.pop(task)
         if demand.id not in self._begun:
             text = "a halt, a stop or the end of the lease came first; nothing was commanded"
             self._tell(demand, DemandState.STOPPED, Answer(text))
@@ -217,7 +214,7 @@ class ManualSession(DrivenBench):
         self._tell(demand, DemandState.DOING, Answer())
         state, answer = DemandState.DONE, Answer()
         try:
-            answer = Answer(await self._WORK[demand.kind](self, demand.values))
+            answer = Answer(await self._work.do(demand))
         except BadParameter as refusal:
             answer = Answer(str(refusal), refusal.field, refusal.value, refusal.allowed)
             state = DemandState.REFUSED
@@ -238,62 +235,3 @@ class ManualSession(DrivenBench):
             state, answer = DemandState.FAILED, Answer(f"{type(defect).__name__}: {defect}")
         finally:
             self._tell(demand, state, answer)
-
-    async def _move(self, values: dict[str, Any]) -> str:
-        table = self._bench.turntable
-        await table.move_to(angles(values, (await table.read()).angles))
-        at = (await table.read()).angles
-        shown = (round(angle, 4) + 0.0 for angle in (at.outer_deg, at.middle_deg, at.inner_deg))  # no -0.0000
-        return f"at rest at {', '.join(f'{angle:.4f}' for angle in shown)} deg"
-
-    async def _rate(self, values: dict[str, Any]) -> str:
-        table, clock = self._bench.turntable, self._bench.clock
-        rate = constant_rate(values, (await table.read()).angles, self._bench.description)
-        await table.command_rate(rate)
-        until_s = clock.now_s() + rate.duration_s
-        while (left_s := until_s - clock.now_s()) > 0.0:
-            await self._time_passes(min(TICK_S, left_s))
-        await table.settle()
-        return f"{rate.rate_deg_s:g} deg/s of the {rate.axis} axis is over, the table rests"
-
-    async def _halt(self, values: dict[str, Any]) -> str:
-        motion = self._motion
-        if motion is not None and not motion.done():
-            motion.cancel()
-            await asyncio.wait([motion], timeout=UNWIND_S)
-        await self._bench.turntable.make_safe()
-        return "the table rests"
-
-    async def _chamber(self, values: dict[str, Any]) -> str:
-        async with self._order:
-            chamber = self._bench.chamber
-            if chamber is None:
-                raise BadParameter("kind", "chamber", "another demand: the bench was opened without its chamber")
-            await chamber.command(values["temperature_c"], values["ramp_c_min"])
-            return f"led to {values['temperature_c']:g} °C at {values['ramp_c_min']:g} K/min"
-
-    async def _supply_on(self, values: dict[str, Any]) -> str:
-        async with self._order:
-            supply = self._bench.supply
-            if values["voltage_v"] is not None:
-                await supply.set_output(values["voltage_v"], values["current_a"])
-            await supply.switch_on()
-            self._sensors.powered(True)
-            reading = await supply.read()
-            return f"on: {reading.voltage_v:.3f} V, {reading.current_a:.3f} A"
-
-    async def _supply_off(self, values: dict[str, Any]) -> str:
-        async with self._order:
-            self._sensors.powered(False)
-            await self._bench.supply.switch_off()
-            return "off"
-
-    _WORK: dict[str, Callable[["ManualSession", dict[str, Any]], Awaitable[str]]] = {  # noqa: RUF012  never changed
-        "home": _move,
-        "go_to": _move,
-        "rate": _rate,
-        "halt": _halt,
-        "chamber": _chamber,
-        "supply_on": _supply_on,
-        "supply_off": _supply_off,
-    }

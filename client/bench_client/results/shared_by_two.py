@@ -87,9 +87,9 @@ class MultiPositionCalibrationDocument(Part):
     extended: tuple[Extended, ...] = ()
     """Fits with further terms, of each triad for which they were asked"""
     thermal: ThermalShare | None = None
-    """where corrected"""
+    """thermal correction of the accelerometers, where it was applied"""
     dwells: DwellsSaved | None = None
-    """of a stop rule"""
+    """dwells ended by the stop rule, and the time saved"""
 
 
 class Transient(Part):

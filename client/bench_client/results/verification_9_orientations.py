@@ -90,7 +90,7 @@ class Verification9OrientationsDocument(Part):
     triads: tuple[TriadVerification, ...]
     """Triads, one entry each"""
     dwells: DwellsSaved | None = None
-    """of a stop rule: each dwell, and the time saved"""
+    """dwells ended by the stop rule, and the time saved"""
 
 
 class Verification9OrientationsResult(ResultHead):

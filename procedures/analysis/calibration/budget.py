@@ -2,7 +2,7 @@
 
 A row has the source's value with its distribution and divisor, which make its standard uncertainty value/divisor, u(x).
 The sensitivity c carries that into the coefficient: contribution = c·u(x) (JCGM 100:2008, 5.1 and 8). Sources of many
-independent parts (a pointing error again at each station) have one value and the sensitivity of all parts together.
+independent parts (a pointing error, drawn at each station) have one value and the sensitivity of all parts together.
 """
 
 from collections.abc import Mapping, Sequence
@@ -125,21 +125,27 @@ def thermal_parts(covariances: Mapping[str, Array], unit: str) -> list[Part]:
 
 def budgets(fit: TriadFit, parts: Sequence[Part], table: TableErrors) -> tuple[Budget, ...]:
     """The budget of each of the twelve coefficients, in their order."""
-    gain = fit.estimator.gain
-    through = [np.sqrt(np.maximum(np.einsum("kci,cij,kcj->k", gain, p.covariance, gain), 0.0)) for p in parts]
+    of_parts = part_rows(parts, fit.estimator.gain)
     of_table = {s: fit.table.standard_uncertainty(s) for s in TABLE if s in fit.table.source}
     values = {s: declared_value(table, s) for s in of_table}
     found: list[Budget] = []
     for i, name in enumerate(COEFFICIENT_NAMES):
-        channel = i // 4
-        rows = [
-            row_of(p.source, p.value[channel], p.unit, float(c[i]), p.distribution, p.divisor, p.degrees_of_freedom)
-            for p, c in zip(parts, through, strict=True)
-        ]
-        rows += [row_of(s, *values[s], float(c[i])) for s, c in of_table.items() if values[s][0] > 0.0]
+        rows = of_parts[i] + [row_of(s, *values[s], float(c[i])) for s, c in of_table.items() if values[s][0] > 0.0]
         unit = coefficient_unit(name, fit.output_unit, fit.input_unit)
         found.append(budget_of(CoefficientName(fit.triad, name), unit, [r for r in rows if r.value > 0.0]))
     return tuple(found)
+
+
+def part_rows(parts: Sequence[Part], gain: Array) -> list[list[BudgetRow]]:
+    """Rows of each coefficient by the parts, through the gain (k, 3, n) from means to coefficients, k/3 a channel."""
+    through = [np.sqrt(np.maximum(np.einsum("kci,cij,kcj->k", gain, p.covariance, gain), 0.0)) for p in parts]
+    return [
+        [
+            row_of(p.source, p.value[channel], p.unit, float(c[i]), p.distribution, p.divisor, p.degrees_of_freedom)
+            for p, c in zip(parts, through, strict=True)
+        ]
+        for i, channel in enumerate(np.repeat(range(3), len(gain) // 3).tolist())
+    ]
 
 
 def budget_of(name: CoefficientName, unit: str, rows: Sequence[BudgetRow]) -> Budget:

@@ -47,8 +47,6 @@ CELLS = 12
 """Stretches of a dwell that its temperatures' line is fitted to."""
 LEAST_CELL_S = 1.0
 """Interval at which a unit sends its temperatures: once a second."""
-
-
 LEAST_DWELL_S = 10.0
 """Least dwell for the temperatures of a station: means, slopes, and their scatter [s]."""
 
@@ -100,6 +98,12 @@ class AtReference:
     """Covariance of the outputs from the correction's coefficients, common to all stations, (3, n, n)."""
     of_sensors: Array
     """Covariance of the outputs from the sensors' noise, (3, n, n)."""
+    correction: ThermalCorrection
+
+    @property
+    def by_cause(self) -> dict[str, Array]:
+        """Covariances of the outputs by the names that their causes have in a budget, (3, n, n) each."""
+        return {"thermal correction": self.of_correction, "thermometers": self.of_sensors}
 
     @property
     def covariance(self) -> Array:
@@ -180,11 +184,12 @@ def bring_to_reference(
     found = station_temperatures(recordings, lag_s, sensors, correction.thermometers)
     case, converter = found.static_c, found.converter_c
 
+    def staged(converter_c: Array) -> Array:
+        stage = correction.first_stage
+        return means.outputs if stage is None else at_reference(means.outputs, converter_c, stage)
+
     def brought(case_c: Array, converter_c: Array) -> Array:
-        v = means.outputs
-        if correction.first_stage is not None:
-            v = at_reference(v, converter_c, correction.first_stage)
-        felt = correction.apply(v, case_c, converter_c, 0.0)
+        felt = correction.apply(staged(converter_c), case_c, converter_c, 0.0)
         scale, bias = (np.array([getattr(a, n) for a in correction.axes]) for n in ("scale", "bias_m_s2"))
         return felt / scale - bias
 
@@ -194,11 +199,8 @@ def bring_to_reference(
     ]
     spreads = (found.mean_sd_c[:, :-1], found.mean_sd_c[:, -1:])
     of_sensors = np.sum([(d * sd) ** 2 for d, sd in zip(by_sensor, spreads, strict=True)], axis=0)
-    staged = means.outputs
-    if correction.first_stage is not None:
-        staged = at_reference(staged, converter, correction.first_stage)
-    own = [case if case.ndim == 1 else case[:, i] for i in range(3)]
-    of_correction = [_of_correction(axis, staged[:, i], own[i], converter) for i, axis in enumerate(correction.axes)]
+    first, own = staged(converter), [case if case.ndim == 1 else case[:, i] for i in range(3)]
+    of_correction = [_of_correction(axis, first[:, i], own[i], converter) for i, axis in enumerate(correction.axes)]
     references = correction.axes[0].case_reference_c, correction.axes[0].converter_reference_c
     return AtReference(
         replace(means, outputs=outputs, at_reference_c=references),
@@ -206,6 +208,7 @@ def bring_to_reference(
         outputs - means.outputs,
         np.array(of_correction),
         np.array([np.diag(column) for column in of_sensors.T]),
+        correction,
     )
 
 
@@ -240,7 +243,7 @@ def gyros_at_reference(
     return replace(means, outputs=correction.apply(means.outputs, own)), covariance
 
 
-def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit) -> ThermalShare:
+def thermal_share(at: AtReference, fit: TriadFit) -> ThermalShare:
     """Effect of the thermal correction on the accelerometers' calibration, through the estimator of the fit."""
 
     def share(covariance: Array) -> dict[str, float]:
@@ -248,7 +251,7 @@ def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit)
         variance = np.einsum("kci,cij,kcj->k", gain, covariance, gain)
         return dict(zip(COEFFICIENT_NAMES, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
 
-    form = correction.axes[0].form
+    form = at.correction.axes[0].form
     return ThermalShare(
         form,
         "static" if form is Form.SWITCHED else "",
@@ -260,8 +263,9 @@ def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit)
     )
 
 
-def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[str, ...]:
-    """Warnings about the use of a correction at these temperatures."""
+def thermal_warnings(at: AtReference) -> tuple[str, ...]:
+    """Warnings about the use of the correction at these temperatures."""
+    correction = at.correction
     warnings = _of_range(at.temperatures, correction)
     unknown = [name for name, axis in zip("xyz", correction.axes, strict=True) if not axis.covariance]
     if unknown:

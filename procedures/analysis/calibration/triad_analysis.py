@@ -157,18 +157,20 @@ def analyse_accelerometers(
     if correction is None:
         return *analyse_means(means, site, uncertainty, record, *how), None, ()
     brought = bring_to_reference(recordings, means, correction, settings.lag_s)
-    more = {"thermal correction": brought.of_correction, "thermometers": brought.of_sensors}
-    summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, more)
-    return summary, fit, thermal_share(brought, correction, fit), thermal_warnings(brought, correction)
+    summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, brought.by_cause)
+    return summary, fit, thermal_share(brought, fit), thermal_warnings(brought)
 
 
 def brought_by_unit(
     recordings: Sequence[Recording], means: StationMeans, unit: Unit, lag_s: tuple[float, float]
 ) -> tuple[StationMeans, dict[str, Array], AtReference | None]:
-    """Station means at the references of the unit's corrections, and their covariances from these, by cause."""
+    """Station means at the references of the unit's corrections, and their covariances from these, by cause.
+
+    Last what was made of the accelerometers; None of the gyros, and without a correction.
+    """
     if means.triad == "accelerometer" and unit.thermal_correction is not None:
-        warm = bring_to_reference(recordings, means, unit.thermal_correction, lag_s)
-        return warm.means, {"thermal correction": warm.of_correction, "thermometers": warm.of_sensors}, warm
+        brought = bring_to_reference(recordings, means, unit.thermal_correction, lag_s)
+        return brought.means, brought.by_cause, brought
     if means.triad == "gyro" and unit.gyro_correction is not None:
         own, covariance = gyros_at_reference(recordings, means, unit.gyro_correction)
         return own, {"thermal correction": covariance}, None

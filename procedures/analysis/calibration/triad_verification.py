@@ -112,7 +112,7 @@ def verify_at_reference(
     `bring_to_reference`.
     """
     brought = bring_to_reference(recordings, station_means(recordings, "accelerometer"), correction, lag_s)
-    return _verified(brought.means, site, unit, uncertainty, brought.covariance), thermal_warnings(brought, correction)
+    return _verified(brought.means, site, unit, uncertainty, brought.covariance), thermal_warnings(brought)
 
 
 def _verified(

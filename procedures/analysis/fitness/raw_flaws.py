@@ -42,7 +42,7 @@ def is_constant(edges: tuple[Edge, Edge], missing_count: int, seen: int) -> bool
 def constant(
     channel: Channel, value: float, is_integer: bool, words: Wording, settings: FitnessSettings
 ) -> list[Finding]:
-    """Finding on a channel of one value, which what is around the unit may have, as a counter among other stations."""
+    """Finding on a channel of one value, which a channel of `AROUND` may have, as a counter among other stations."""
     railed = is_integer and value in RAILS
     rail = ", the end of its range" if railed else ""
     begin = f"channel {channel.name}: the channel is constant, it reads {value:.9g}{rail}"

@@ -18,13 +18,15 @@ from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 
 PARAMETERS = 3
+"""Number of fitted parameters, ln G, D and q, and least number of frequencies."""
 LEVEL = 1e-3
 """Probability below which residuals are not the noise's alone."""
 ONE_SIDED = 1.645
 """Factor of a limit that holds with 95 % (normal)."""
 SIGNIFICANT = 3.0
-"""Standard uncertainties by which q must be above zero for a time constant to be told."""
+"""Standard uncertainties by which q must be above zero for a time constant to be stated."""
 MOST_SCATTER_S = 1.0
+"""Largest standard deviation of the delay from recording to recording that is taken for scattered stamps [s]."""
 
 
 @dataclass(frozen=True)

@@ -40,8 +40,6 @@ class Response:
     """Standard deviation of the gain, relative."""
     phase_sd: float
     """Standard deviation of the phase [rad]."""
-    encoder_sd: float
-    """Part of it by the encoder's scatter alone."""
     noise_ratio: float
     """Power of the noise beside the sinusoid over that of the unit's record and the encoder's scatter."""
     noise_degrees: float
@@ -97,7 +95,7 @@ def response(samples: Samples, frequency_hz: float, noise: NoiseCoefficients | N
     require_known(samples.label, max(gain_sd, phase_sd))
     drift, drift_sd = _drift(samples, omega, length_s, phase_sd)
     return Response(
-        *(samples.label, frequency_hz, abs(theta), value, gain_sd, phase_sd, scatter / abs(theta)),
+        *(samples.label, frequency_hz, abs(theta), value, gain_sd, phase_sd),
         *(ratio, degrees, encoder.within_s, drift, drift_sd),
     )
 

@@ -5,7 +5,7 @@ The amplitude falls with the frequency, so that rate and acceleration stay withi
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, pi, sqrt
+from math import ceil, hypot, pi, sqrt
 from typing import Literal
 
 from procedures.analysis.response.fit import Lag, fit_lags
@@ -116,18 +116,17 @@ def _predicted(
     of_encoder = 0.0
     if encoder is not None:
         of_encoder = encoder.sd_arcsec * units.ARCSEC * sqrt(2.0 / (encoder.rate_hz * length_s)) / theta
-    sd = max(sqrt(of_gyro**2 + of_encoder**2), 1e-12)
+    sd = max(hypot(of_gyro, of_encoder), 1e-12)
     return Response(
-        f"{frequency_hz:g} Hz, {amplitude_deg:g} deg",
-        frequency_hz,
-        theta,
-        1.0 + 0.0j,
-        sd,
-        sd,
-        of_encoder,
-        1.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
+        label=f"{frequency_hz:g} Hz, {amplitude_deg:g} deg",
+        frequency_hz=frequency_hz,
+        amplitude_rad=theta,
+        value=1.0 + 0.0j,
+        gain_sd=sd,
+        phase_sd=sd,
+        noise_ratio=1.0,
+        noise_degrees=0.0,
+        within_s=0.0,
+        drift=0.0,
+        drift_sd=0.0,
     )

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, hypot, isfinite, pi, sqrt
+from math import exp, hypot, isfinite, sqrt
 
 import numpy as np
 
 from procedures.analysis.least_squares.chi_square import tail_probability
-from procedures.analysis.response.fit import LEVEL, Lag, Lags, fit_lags, gain_p_value, model, unwrapped
+from procedures.analysis.response.fit import LEVEL, PARAMETERS, Lag, Lags, fit_lags, gain_p_value, model, unwrapped
 from procedures.analysis.response.phasors import Response, response
 from procedures.analysis.response.trace import samples_of
 from procedures.core import units
@@ -111,8 +111,8 @@ def analyse_response(
         found = response(samples_of(recording, channel, directions), frequency_hz, noise.get(channel))
         by_channel.setdefault(channel, []).append(_with_its_noise(found, warnings))
     for channel, responses in by_channel.items():
-        if len({r.frequency_hz for r in responses}) < 3:
-            raise UnfitRecording(f"{channel}: a delay and a lag need three frequencies, there are {len(responses)}")
+        if (count := len({r.frequency_hz for r in responses})) < PARAMETERS:
+            raise UnfitRecording(f"{channel}: a delay and a lag need {PARAMETERS} frequencies, there are {count}")
     lags = fit_lags(by_channel, linearity)
     within = float(np.mean([r.within_s for responses in by_channel.values() for r in responses]))
     encoder_sd = hypot(within / sqrt(3.0), encoder_time_sd_s)
@@ -185,31 +185,32 @@ def _channel(
     name: str, responses: Sequence[Response], lag: Lag, encoder_sd_s: float, scatter_s: float, freedom: int
 ) -> ChannelResponse:
     gain = exp(lag.log_gain)
-    constant, bandwidth = lag.time_constant_s, lag.bandwidth_hz
+    constant_s, constant_sd_s = lag.time_constant_s or (None, None)
+    bandwidth_hz, bandwidth_sd_hz = lag.bandwidth_hz or (None, None)
     highest = max(r.frequency_hz for r in responses)
     drift, drift_sd = _clock(responses)
     return ChannelResponse(
-        name,
-        gain,
-        gain * sqrt(float(lag.covariance[0, 0])),
-        lag.delay_s,
-        hypot(lag.delay_sd_s, encoder_sd_s),
-        lag.delay_sd_s,
-        encoder_sd_s,
-        freedom if scatter_s > 0.0 else None,
-        None if constant is None else constant[0],
-        None if constant is None else constant[1],
-        None if bandwidth is None else bandwidth[0],
-        None if bandwidth is None else bandwidth[1],
-        lag.bandwidth_above_hz,
-        bandwidth is not None and bandwidth[0] > highest,
-        lag.chi_square,
-        lag.degrees_of_freedom,
-        lag.p_value,
-        gain_p_value(lag),
-        drift / units.PPM,
-        drift_sd / units.PPM,
-        _points(responses, lag, scatter_s),
+        channel=name,
+        gain=gain,
+        gain_standard_uncertainty=gain * sqrt(float(lag.covariance[0, 0])),
+        delay_s=lag.delay_s,
+        delay_standard_uncertainty_s=hypot(lag.delay_sd_s, encoder_sd_s),
+        delay_from_noise_s=lag.delay_sd_s,
+        delay_from_encoder_s=encoder_sd_s,
+        delay_degrees_of_freedom=freedom if scatter_s > 0.0 else None,
+        time_constant_s=constant_s,
+        time_constant_standard_uncertainty_s=constant_sd_s,
+        bandwidth_hz=bandwidth_hz,
+        bandwidth_standard_uncertainty_hz=bandwidth_sd_hz,
+        bandwidth_above_hz=lag.bandwidth_above_hz,
+        extrapolated=bandwidth_hz is not None and bandwidth_hz > highest,
+        chi_square=lag.chi_square,
+        degrees_of_freedom=lag.degrees_of_freedom,
+        p_value=lag.p_value,
+        gain_p_value=gain_p_value(lag),
+        clock_difference_ppm=drift / units.PPM,
+        clock_difference_standard_uncertainty_ppm=drift_sd / units.PPM,
+        points=_points(responses, lag, scatter_s),
     )
 
 
@@ -230,15 +231,15 @@ def _points(responses: Sequence[Response], lag: Lag, scatter_s: float) -> tuple[
     measured = unwrapped(np.angle([r.value for r in ordered]), omega)
     return tuple(
         ResponsePoint(
-            r.frequency_hz,
-            r.amplitude_rad / units.DEG,
-            abs(r.value),
-            abs(r.value) * r.gain_sd,
-            float(measured[k]) * 180.0 / pi,
-            hypot(r.phase_sd, r.omega * scatter_s) * 180.0 / pi,
-            exp(float(gains[k])),
-            float(phases[k]) * 180.0 / pi,
-            r.noise_ratio,
+            frequency_hz=r.frequency_hz,
+            amplitude_deg=r.amplitude_rad / units.DEG,
+            gain=abs(r.value),
+            gain_sd=abs(r.value) * r.gain_sd,
+            phase_deg=float(measured[k]) / units.DEG,
+            phase_sd_deg=hypot(r.phase_sd, r.omega * scatter_s) / units.DEG,
+            modelled_gain=exp(float(gains[k])),
+            modelled_phase_deg=float(phases[k]) / units.DEG,
+            noise_ratio=r.noise_ratio,
         )
         for k, r in enumerate(ordered)
     )

@@ -19,6 +19,7 @@ from procedures.analysis.calibration.budget import (
     budget_of,
     declared_value,
     noise_parts,
+    part_rows,
     row_of,
 )
 from procedures.analysis.calibration.table_errors import TableErrors
@@ -42,23 +43,18 @@ def turn_budgets(
 ) -> tuple[Budget, ...]:
     """The budget of each coefficient, in the order of `names`; without `parts` the noise is that of the residuals."""
     made = fit.estimator
-    gain = made.gain.reshape(len(names), 3, -1)
-    contributed = [np.sqrt(np.maximum(np.einsum("kci,cij,kcj->k", gain, p.covariance, gain), 0.0)) for p in parts]
+    of_parts = part_rows(parts, made.gain.reshape(len(names), 3, -1))
     sources = [s for s in dict.fromkeys(made.source) if np.any(made.of_source(s) > 0.0)]
     of_table = {s: (declared_value(flaws, s), made.of_source(s)) for s in sources}
     observed = np.sqrt(np.diagonal(fit.noise_covariance))
     scale = float(np.sqrt(fit.chi_square / fit.degrees_of_freedom)) if fit.degrees_of_freedom else 1.0
-    per_channel = len(names) // 3
     found: list[Budget] = []
     for i, name in enumerate(names):
-        rows = [
-            row_of(p.source, p.value[i // per_channel], p.unit, float(c[i]), p.distribution, p.divisor)
-            for p, c in zip(parts, contributed, strict=True)
-        ]
+        rows = of_parts[i]
         if not parts:
             freedom = float(max(1, fit.degrees_of_freedom))
-            rows.append(row_of(OBSERVED, scale * UNKNOWN_NOISE_SD, "rad", float(observed[i]), freedom=freedom))
-        rows += [row_of(s, *value, float(c[i])) for s, (value, c) in of_table.items()]
+            rows = [row_of(OBSERVED, scale * UNKNOWN_NOISE_SD, "rad", float(observed[i]), freedom=freedom)]
+        rows = rows + [row_of(s, *value, float(c[i])) for s, (value, c) in of_table.items()]
         unit = "rad/s" if name.symbol.startswith("b_") else "1"
         found.append(budget_of(name, unit, [r for r in rows if r.value > 0.0]))
     return tuple(found)

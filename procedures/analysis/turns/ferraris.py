@@ -14,9 +14,8 @@ import numpy as np
 from procedures.analysis.calibration.station_means import StationMeans, station_means
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
-from procedures.analysis.turns.budget import turn_budgets, turn_parts
 from procedures.analysis.turns.fit import TurnEstimator, Turning, fitted, turn_estimator, turn_flaws, turning
-from procedures.analysis.turns.summary import WholeTurns, require_turns, whole_turns
+from procedures.analysis.turns.summary import WholeTurns, require_turns, whole_turns, with_budgets
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -106,11 +105,7 @@ def analyse_ferraris(
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]
     fit = fitted(ferraris_estimator(motion, noise, uncertainty, matrix), outputs, noise is not None)
     found = whole_turns(fit, (), motion, outputs, np.flatnonzero(turns).tolist(), noise is not None)
-    parts, names = (
-        turn_parts(record if noise is not None else None, means.windows),
-        [c.name for c in found.coefficients],
-    )
-    return replace(found, budgets=turn_budgets(fit, names, parts, ferraris_flaws(motion, uncertainty)))
+    return with_budgets(found, fit, record, means.windows, ferraris_flaws(motion, uncertainty))
 
 
 def faces_of(recordings: Sequence[Recording]) -> list[Station]:

@@ -9,7 +9,7 @@ from procedures.analysis.calibration.budget import Budget
 from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.summary import Coefficient
-from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty
 from procedures.analysis.own_axes import axes_answered, wrong_axes
 from procedures.analysis.turns.budget import turn_budgets, turn_parts
 from procedures.analysis.turns.fit import Term, TurnFit, Turning, fit_turns, turn_flaws, turning
@@ -95,9 +95,8 @@ def analyse_turns(
     reference = reference_rate_deg_s * units.DEG
     fit = fit_turns(motion, outputs, terms, reference, noise, uncertainty)
     made = whole_turns(fit, terms, motion, outputs, range(len(outputs)), noise is not None)
-    parts, names = turn_parts(record if noise is not None else None, means.windows), [c.name for c in made.coefficients]
-    of_each = turn_budgets(fit, names, parts, turn_flaws(motion, uncertainty))
-    return replace(made, reference_rate_deg_s=reference_rate_deg_s, budgets=of_each)
+    made = with_budgets(made, fit, record, means.windows, turn_flaws(motion, uncertainty))
+    return replace(made, reference_rate_deg_s=reference_rate_deg_s)
 
 
 def whole_turns(
@@ -120,6 +119,14 @@ def whole_turns(
         fit.p_value,
         noise_known,
     )
+
+
+def with_budgets(
+    found: WholeTurns, fit: TurnFit, record: TriadRecord | None, windows: Array, flaws: TableErrors
+) -> WholeTurns:
+    """The result with the budget of each coefficient; `windows` (n, 2) of the recordings, `flaws` of the table."""
+    parts = turn_parts(record if found.noise_known else None, windows)
+    return replace(found, budgets=turn_budgets(fit, [c.name for c in found.coefficients], parts, flaws))
 
 
 def _stations(recordings: Sequence[Recording]) -> list[Station]:
