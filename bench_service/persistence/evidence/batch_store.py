@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import exists, insert, or_, select, update
+from sqlalchemy import exists, insert, select, update
 
 from bench_service.model.batches import AnalysisBatch, AnalysisTask, Selection, TaskState
 from bench_service.model.errors import IllegalTransition
@@ -45,19 +45,18 @@ class SqlBatchStore(SqlBatchQueue):
         if selection.procedure is not None:
             of_job = RecordingRow.job_id == JobRow.id
             query = query.where(exists().where(of_job, JobRow.procedure == selection.procedure))
-        found: list[tuple[str, str | None, str]] = []
+        found: dict[str, tuple[str, str | None, str]] = {}
         with self._database.read() as session:
-            if selection.search.text is not None:
-                query = query.where(or_(*ways_to_recordings(session, selection.search.text)))
-            parts = [query]
-            if selection.ids:
-                parts = [query.where(RecordingRow.id.in_(ids)) for ids in in_parts(sorted(selection.ids))]
-            for part in parts:
-                rows = session.execute(part.order_by(RecordingRow.id).limit(limit - len(found)))
-                found += [(row.id, row.job_id, row.unit) for row in rows]
+            text = selection.search.text
+            ways = [query] if text is None else [query.where(way) for way in ways_to_recordings(session, text)]
+            for ids in in_parts(sorted(selection.ids)) if selection.ids else [None]:
+                for way in ways:
+                    part = way if ids is None else way.where(RecordingRow.id.in_(ids))
+                    rows = session.execute(part.order_by(RecordingRow.id).limit(limit))
+                    found |= {row.id: (row.id, row.job_id, row.unit) for row in rows}
                 if len(found) >= limit:
                     break
-        return tuple(found)
+        return tuple(found[known] for known in sorted(found)[:limit])
 
     def add(
         self, batch: AnalysisBatch, groups: Sequence[Sequence[str]], idempotency: Idempotency | None = None
