@@ -6,7 +6,7 @@ import { t } from "./words.js";
 
 const place = document.getElementById("estimates"), EVERY_MS = 10000;
 const charts = new Map(), boxes = {};
-let timer = null;
+let timer = null, soon = false;
 
 const triadOf = (channel) => channel.replace(/_[xyz]$/, "");
 
@@ -67,6 +67,7 @@ function coefficients(list) {
 }
 
 async function look() {
+  soon = false;
   clearTimeout(timer);
   timer = setTimeout(look, EVERY_MS);
   if (document.hidden) return;
@@ -80,7 +81,12 @@ async function look() {
   if (found.coefficients.length) coefficients(found.coefficients);
 }
 
-/** Look again: a station has ended. */
-export function stationDone() { if (place) { clearTimeout(timer); timer = setTimeout(look, 500); } }
+/** Look again within half a second of a station's end; a look that is due is not put off by the next station. */
+export function stationDone() {
+  if (!place || soon) return;
+  soon = true;
+  clearTimeout(timer);
+  timer = setTimeout(look, 500);
+}
 
 if (place) look();
