@@ -42,7 +42,7 @@ class SqlTallyStore:
         open_states = ("queued", "running", "paused", "interrupted")
         query = select(JobRow.id, JobRow.stations_done).where(JobRow.state.in_(open_states), JobRow.stations_done > 0)
         with self._database.read() as session:
-            return {job: stations for job, stations in session.execute(query)}
+            return {row.id: row.stations_done for row in session.execute(query)}
 
     def recorded_bytes(self) -> int:
         listed = (RecordingState.COMPLETE.value, RecordingState.INTERRUPTED.value)
