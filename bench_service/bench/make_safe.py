@@ -78,6 +78,14 @@ def over_new_link(devices: BenchDevices, by: str) -> Obstacle | None:
     return None if state.safe else Obstacle(state.unsafe)
 
 
+def has_register(devices: BenchDevices) -> bool:
+    """Return whether devices have a register on this host; True also where it cannot be read now."""
+    try:
+        return devices.device_state() is not None
+    except OSError:  # no descriptor left, for one: a stop must not end here
+        return True
+
+
 def still_unsafe(devices: BenchDevices, by: str, of: str) -> str | None:
     """The reason to stop a bench whose devices do not read as safe at the end `of` something, by their register.
 

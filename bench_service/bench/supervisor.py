@@ -180,13 +180,13 @@ class Supervisor:
     def _end_hung(
         self, now_s: float, worker: ProcessIdentity, state: DeviceState | None, words: frozenset[str]
     ) -> None:
-        """Kill a worker that leaves the devices unsafe under its link, and is unresponsive, silent or hung."""
-        if state is None or state.safe or not state.linked:
+        """Kill a worker with the devices' link that leaves them unsafe and is silent or hung, or answers no stop."""
+        if state is None or not state.linked:
             self._patience.reset(now_s)
             return
-        why = self._patience.over(now_s, worker, words, self._stopped)
+        why = self._patience.over(now_s, worker, words, self._stopped, state.safe)
         if why is not None and worker.kill():
-            self._say(f"{worker} {why} ({', '.join(state.unsafe)}): killed", state.job)
+            self._say(f"{worker} {why} ({', '.join(state.unsafe) or 'the devices are safe'}): killed", state.job)
             self._patience.reset(now_s)
 
     def _look_for_left(self, now_s: float, state: DeviceState | None) -> None:

@@ -11,7 +11,7 @@ from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import LiveBoard
-from bench_service.bench.make_safe import Obstacle, RoadEnd, over_new_link, still_unsafe, whole_road
+from bench_service.bench.make_safe import Obstacle, RoadEnd, has_register, over_new_link, still_unsafe, whole_road
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.session import BenchSession
 from bench_service.evidence.catalogue import AnyProcedure
@@ -184,7 +184,7 @@ class JobRunner:
             self._try_again()
             return
         session.stop()
-        if self._driver.device_state() is None:  # a bench without a register: its one link is the session's
+        if not has_register(self._driver):  # a bench without a register: its one link is the session's
             return
         end = self._whole_road(session)
         if end.obstacle is not None:

@@ -10,7 +10,7 @@ from threading import Event, Lock
 from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
-from bench_service.bench.make_safe import RoadEnd, over_new_link, still_unsafe, whole_road
+from bench_service.bench.make_safe import RoadEnd, has_register, over_new_link, still_unsafe, whole_road
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.worker_patience import ENDING_S
 from bench_service.jobs.manual.reader import LeaseReader
@@ -95,7 +95,7 @@ class ManualRunner:
         session.stop()
         if (reader := self._reader) is not None:
             reader.end_delivery()
-        if self._driver.device_state() is not None:  # else the session's own link is the only one
+        if has_register(self._driver):  # else the session's own link is the only one
             self._whole_road(session)
 
     def shut_down(self) -> None:
