@@ -65,7 +65,7 @@ class DrivenBench:
         self._stop_wanted = NonBlockingQuery("stop", stop_wanted)
         self._unanswered_s = 0.0
         self._unwinding: set[asyncio.Task[Any]] = set()
-        self._work: frozenset[asyncio.Task[Any]] | None = None
+        self._before_safe: frozenset[asyncio.Task[Any]] | None = None
         """Tasks that were there when making safe began; None: it is not under way."""
         self._shutting_down = threading.Event()
         self._stopped = threading.Event()
@@ -243,7 +243,9 @@ class DrivenBench:
         self._unwinding.add(own)
         try:
             left = asyncio.all_tasks(self._loop) - self._unwinding
-            await asyncio.gather(*(left if self._work is None else left & self._work), return_exceptions=True)
+            await asyncio.gather(
+                *(left if self._before_safe is None else left & self._before_safe), return_exceptions=True
+            )
         finally:
             self._unwinding.discard(own)
 
@@ -251,7 +253,7 @@ class DrivenBench:
         own = asyncio.current_task(self._loop)
         assert own is not None
         self._unwinding.add(own)
-        self._work = frozenset(asyncio.all_tasks(self._loop) - self._unwinding)
+        self._before_safe = frozenset(asyncio.all_tasks(self._loop) - self._unwinding)
         try:
             await self._leave_in_time()
         finally:
@@ -259,7 +261,7 @@ class DrivenBench:
                 await self._bench.make_safe()
             finally:
                 self._unwinding.discard(own)
-                self._work = None
+                self._before_safe = None
 
     async def _leave_in_time(self) -> None:
         """Leave the work, for `LEAVE_S` at the most; a defect in a procedure's own ending says nothing of devices."""

@@ -175,13 +175,10 @@ class JobRunner:
     def stop_now(self) -> None:
         """Leave the running job's station and make the bench safe, also while the job's own thread hangs.
 
-        Called by the stop guard, again and again while a stop stands and the bench is not safe: devices that an
-        earlier attempt has given up are tried over a new link. The job's end is noted by its own thread, as soon as
-        possible.
+        Called by the stop guard. The job's end is noted by its own thread, as soon as possible.
         """
         session = self._session
         if session is None:
-            self._try_again()
             return
         session.stop()
         if not has_register(self._driver):  # a bench without a register: its one link is the session's
@@ -198,8 +195,11 @@ class JobRunner:
         with self._road:
             return whole_road(session, self._driver, self._by, given_back)
 
-    def _try_again(self) -> None:
-        """Make devices safe that nobody has the link of: without a supervisor nobody else does before a release."""
+    def try_again(self) -> None:
+        """Make devices safe over a new link that an earlier attempt has given up, once in `AGAIN_S`.
+
+        For a stopped bench without a supervisor: nobody else tries before a person releases it.
+        """
         with self._road:
             state = self._driver.device_state()
             if self._session is not None or state is None or state.safe or state.linked:

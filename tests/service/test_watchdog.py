@@ -3,14 +3,18 @@
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Generator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from threading import Event, Thread
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bench_service import driving
 from bench_service.bench import driven
 from bench_service.bench.devices import DeviceState
 from bench_service.bench.watchdog import TimeLimits, Watchdog
@@ -248,11 +252,17 @@ def test_a_stop_tries_again_at_devices_that_an_attempt_has_given_up(
     assert runner.acquire(job.id, 0).failure is not None
     runner.stop_now()
     assert runner.make_safe(job.id).failure is not None
-    runner.stop_now()
+    watch: Any = SimpleNamespace(supervisor=lambda: None)
+    stop_again = partial(driving._stop_now, runner, MagicMock(), watch)
+    stop_again()
     assert not safe(driver)
     driver.unreachable = False
+    watch.supervisor = lambda: "a supervisor, which does it"
     pause(0.06)
-    runner.stop_now()
+    stop_again()
+    assert not safe(driver)
+    watch.supervisor = lambda: None
+    stop_again()
     assert safe(driver)
 
 
