@@ -158,7 +158,7 @@ def test_recordings_without_a_bench_are_brought_to_the_reference_by_the_units_co
     cold = replace(correction, fitted_range=TemperatureRange((-40.0, 30.0), (-40.0, 30.0)))
     beyond = method.analyse(Evidence(tuple(data)), params, replace(unit, thermal_correction=cold))
     assert any("beyond the range" in w for w in beyond.warnings)
-    with pytest.raises(BadParameter, match="has no thermal correction yet"):
+    with pytest.raises(BadParameter, match="has no current thermal correction"):
         method.analyse(Evidence(tuple(data)), params, replace(unit, thermal_correction=None))
     with pytest.raises(BadParameter, match="needs the recordings' unit"):
         method.analyse(Evidence(tuple(data)), params, None)
