@@ -56,7 +56,10 @@ def require_correctable(thermal_correction: str, dwell_s: float | None, unit: Un
     if thermal_correction != "current":
         return
     if unit.thermal_correction is None:
-        why = unit.why_withheld("thermal") or f"unit {unit.serial} has no thermal correction yet"
+        why = unit.why_withheld("thermal") or (
+            f"unit {unit.serial} has no current thermal correction: run a thermal_cycle, or choose one of its history; "
+            "one that failed counts only where it is chosen"
+        )
         raise BadParameter("thermal_correction", "current", f"none: {why}")
     if dwell_s is not None and dwell_s < LEAST_DWELL_S:
         raise BadParameter("dwell_s", dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read at the same time")
