@@ -251,10 +251,8 @@ def create_app(
     app.state.news = news.NewsReader(service)
     app.state.max_import_bytes = max_import_bytes
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
-    for module in ROUTERS:
-        app.include_router(module.router)
-    for page in PAGES:
-        app.include_router(page.router)
+    for module in (*ROUTERS, *PAGES):
+        module.router.add_to(app.router)
     app.add_middleware(guard.Guarded, access=service.access)
     transfer.install(app)
     app.add_middleware(bodies.Bounded)

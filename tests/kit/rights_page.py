@@ -40,9 +40,11 @@ class RouteRight(NamedTuple):
 def routes() -> Iterator[RouteRight]:
     """Every verb of every route of the application."""
     for module in (*ROUTERS, *PAGES):
-        for route in module.router.routes:
-            for method in sorted(route.methods):
-                yield RouteRight(method, route.path, route.name, right_of(route.name, method), route.include_in_schema)
+        shown = module.router.include_in_schema
+        for path, endpoint, options in module.router.declared:
+            name = endpoint.__name__
+            for method in sorted(options["methods"]):
+                yield RouteRight(method, path, name, right_of(name, method), shown and options["include_in_schema"])
 
 
 def allowed(right: Right, role: Role | None) -> bool:
