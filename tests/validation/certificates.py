@@ -3,9 +3,9 @@
     python -m tests.validation.certificates [--units 100]
 
 Random coefficients of both triads are entered into a service, each with a standard uncertainty of its own. Those of one
-triad, gyros and accelerometers in turn, come back as the JSON of the export; of every second pair of units the export's
-covariance is then a full one, by chance. The certificate of each unit must be valid by lxml and by xmlschema (where the
-schema's files are in ../shared/data/dcc) and by our rules, its signature by signxml and by xmlsec; with one digit of one
+triad, gyros and accelerometers in turn, come back as the JSON of the export; of every second pair of units its
+covariance is then a full one, by chance. The certificate of each unit must be valid by lxml and by xmlschema (where
+the schema is in ../shared/data/dcc) and by our rules, its signature by signxml and by xmlsec; with one digit of one
 value changed, by chance, both must refuse it. Coefficients and variances of the certificate are compared with the
 numbers that SQLite gives for the stored rows: as floating-point numbers, bit by bit. Exit code 1 where one of these
 fails. About two minutes.
