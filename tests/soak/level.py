@@ -1,5 +1,6 @@
 """Figures of a service over a soak, and whether memory, descriptors, threads and logs stay level."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -67,10 +68,10 @@ def judged(name: str, found: Slope) -> list[str]:
     return [f"{name}: {found} MB does not tell growth by {LEVEL_MB} MB from none: the soak was too short or too uneven"]
 
 
-def judged_counts(samples: Samples) -> list[str]:
-    """Print descriptors and threads by quarter; return those that grow."""
+def judged_counts(series: Mapping[str, Sequence[int]]) -> list[str]:
+    """Print counts by quarter, each by its name; return those that grow."""
     wrong: list[str] = []
-    for name, counts in (("descriptors", samples.descriptors), ("threads", samples.threads)):
+    for name, counts in series.items():
         quarters = np.array_split(np.array(counts), 4)
         print(f"{name}: {', '.join(str(int(q.max())) for q in quarters)} at most in each quarter")
         if quarters[3].max() > quarters[1].max() + GROWN:
@@ -98,7 +99,7 @@ def judge(samples: Samples, minutes: float) -> list[str]:
             wrong += faults
         else:  # children come and go: what they add is uneven
             print("".join(f"  {fault}" for fault in faults) or "  level")
-    wrong += judged_counts(samples)
+    wrong += judged_counts({"descriptors": samples.descriptors, "threads": samples.threads})
     print(f"write-ahead log: {max(samples.wal_mb):.1f} MB at most")
     if max(samples.wal_mb) > WAL_MB:
         wrong.append(f"the write-ahead log has {max(samples.wal_mb):.0f} MB")

@@ -33,6 +33,7 @@ from tests.benchmarks.process import free_port
 from tests.conformance.served import served
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.wired_bench import THERMAL_LANGUAGES, bench_file
+from tests.soak.descriptors import Descriptors, descriptors_of
 from tests.soak.level import LEVEL_MB, Samples, judged_counts
 from tests.soak.slope import slope
 from tests.soak.wire_faults import Faults
@@ -160,9 +161,9 @@ def checked_recordings(load: WiredLoad, client: httpx.Client, journal: Journal) 
     return good, wrong
 
 
-def level(samples: Samples, minutes: float) -> list[str]:
+def level(samples: Samples, descriptors: Descriptors, minutes: float) -> list[str]:
     """Print the service's figures; a sentence for each that grows."""
-    wrong = judged_counts(samples)
+    wrong = descriptors.judged(minutes) + judged_counts({"threads": samples.threads})
     times, late = np.array(samples.minutes), np.array(samples.minutes) >= minutes / 4.0
     memory = np.array(samples.memory_mb)
     quarters = [float(q.mean()) for q in np.array_split(memory, 4)]
@@ -178,29 +179,16 @@ def level(samples: Samples, minutes: float) -> list[str]:
     return wrong
 
 
-def _watched(bench: BenchProcess, samples: Samples, since_s: float, folder: Path) -> None:
+def _look_at(bench: BenchProcess, since_s: float, take: Callable[[float, psutil.Process], None]) -> None:
     try:
-        samples.take((monotonic_s() - since_s) / 60.0, psutil.Process(bench.process.pid), folder)
+        take((monotonic_s() - since_s) / 60.0, psutil.Process(bench.process.pid))
     except psutil.NoSuchProcess:
         return
 
 
-def descriptors_of(process_id: int) -> Counter[str]:
-    """Open descriptors of a process by what they are: the name of a file, or sockets, pipes and the like."""
-    found: Counter[str] = Counter()
-    folder = Path(f"/proc/{process_id}/fd")
-    for entry in folder.iterdir():
-        try:
-            target = os.readlink(entry)
-        except OSError:
-            continue
-        found[Path(target).name if target.startswith("/") else target.split(":")[0]] += 1
-    return found
-
-
 def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) -> list[str]:
     """Run the soak; print its figures, and return what was not kept."""
-    chance, samples = Random(seed), Samples()
+    chance, samples, descriptors = Random(seed), Samples(), Descriptors()
     with tempfile.TemporaryDirectory(prefix="wires-") as name, served(THERMAL_LANGUAGES, True, factor) as behind:
         folder, journal, faults = Path(name), Journal(behind), Faults(behind, Random(seed + 1), mean_s)
         file = bench_file(folder, behind, factor, after_demand_s=0.02)
@@ -210,7 +198,8 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
         kills, next_kill_s = list[float](), monotonic_s() + (chance.expovariate(1.0 / kill_s) if kill_s else np.inf)
         try:
             bench.start()
-            begun_s, looked_s = monotonic_s(), 0.0
+            begun_s, looked_s, at_rest_s = monotonic_s(), 0.0, 0.0
+            names = {bench.client.base_url.port or 0: "clients"} | {n: f"the {k}" for k, n in behind.numbers.items()}
             end_s = begun_s + 60.0 * minutes
             while monotonic_s() < end_s:
                 if monotonic_s() < end_s - CALM_S:
@@ -220,15 +209,18 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
                 if monotonic_s() > next_kill_s and monotonic_s() < end_s - 2.0 * CALM_S:
                     bench.kill()
                     bench.start()
-                    kills, samples = [*kills, monotonic_s()], Samples()
+                    kills, samples, descriptors = [*kills, monotonic_s()], Samples(), Descriptors()
                     next_kill_s = monotonic_s() + chance.expovariate(1.0 / kill_s)
                 load.step()
+                if load.idle and monotonic_s() - at_rest_s > 1.0:  # between two jobs: what a job needs is given back
+                    at_rest_s = monotonic_s()
+                    _look_at(bench, begun_s, lambda m, p: descriptors.take(m, descriptors_of(p, names)))
                 if monotonic_s() - looked_s > EVERY_S:
                     looked_s = monotonic_s()
-                    _watched(bench, samples, begun_s, folder)
+                    _look_at(bench, begun_s, lambda m, p: samples.take(m, p, folder))
                 pause(0.1)
             bench.until(lambda: _idle(load), 120)
-            print(f"descriptors at the end: {dict(descriptors_of(bench.process.pid).most_common(12))}")
+            print(f"descriptors at the end: {dict(descriptors.kinds[-1].most_common())}")
             good, wrong = checked_recordings(load, bench.client, journal)
         finally:
             bench.end()
@@ -238,7 +230,7 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
         print(*(f"  {count} × {reason}" for reason, count in load.reasons.most_common(12)), sep="\n")
         late_s = behind.bench.pace.behind_s
         print(f"table: {journal.demands} demands, {journal.requests} requests; {late_s:.1f} s of bench time given up")
-    return wrong + (level(samples, minutes) if not kill_s else [])
+    return wrong + (level(samples, descriptors, minutes) if not kill_s else [])
 
 
 def _idle(load: WiredLoad) -> bool:
