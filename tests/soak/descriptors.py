@@ -76,11 +76,11 @@ def _socket(connection: Any, names: Mapping[int, str]) -> str:
 class Descriptors:
     """Descriptors of a process over a run, and whether it keeps ever more of them.
 
-    Two parts are judged apart. Connections of a database come with those who ask at the same time: a pool keeps five and
-    lends ten more, so their number may reach a level late and is held to that of the pool. All others come and go with
-    jobs, lines and the event loops of those who ask devices; what leaks is never given back, so the *least* number of
-    each minute rises. Its slope is judged with its interval, after a quarter of the run. Looks between two jobs show it
-    best.
+    Two parts are judged apart. Connections of a database come with those who ask at the same time: a pool keeps five
+    and lends ten more, so their number may reach a level late and is held to that of the pool. All others come and go
+    with jobs, lines and the event loops of those who ask devices; what leaks is never given back, so the *least* number
+    of each minute rises. Its slope is judged with its interval, after a quarter of the run. Looks between two jobs show
+    it best.
     """
 
     def __init__(self) -> None:

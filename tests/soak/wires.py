@@ -17,7 +17,8 @@ import os
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -179,11 +180,11 @@ def level(samples: Samples, descriptors: Descriptors, minutes: float) -> list[st
     return wrong
 
 
-def _look_at(bench: BenchProcess, since_s: float, take: Callable[[float, psutil.Process], None]) -> None:
-    try:
-        take((monotonic_s() - since_s) / 60.0, psutil.Process(bench.process.pid))
-    except psutil.NoSuchProcess:
-        return
+@contextmanager
+def _looked_at(bench: BenchProcess) -> Generator[psutil.Process]:
+    """The service's process; what is taken of it is left out where it has ended."""
+    with suppress(psutil.NoSuchProcess):
+        yield psutil.Process(bench.process.pid)
 
 
 def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) -> list[str]:
@@ -214,10 +215,12 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
                 load.step()
                 if load.idle and monotonic_s() - at_rest_s > 1.0:  # between two jobs: what a job needs is given back
                     at_rest_s = monotonic_s()
-                    _look_at(bench, begun_s, lambda m, p: descriptors.take(m, descriptors_of(p, names)))
+                    with _looked_at(bench) as process:
+                        descriptors.take((at_rest_s - begun_s) / 60.0, descriptors_of(process, names))
                 if monotonic_s() - looked_s > EVERY_S:
                     looked_s = monotonic_s()
-                    _look_at(bench, begun_s, lambda m, p: samples.take(m, p, folder))
+                    with _looked_at(bench) as process:
+                        samples.take((looked_s - begun_s) / 60.0, process, folder)
                 pause(0.1)
             bench.until(lambda: _idle(load), 120)
             print(f"descriptors at the end: {dict(descriptors.kinds[-1].most_common())}")
