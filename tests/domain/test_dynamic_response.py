@@ -13,6 +13,7 @@ from procedures.bench.declared_device import DeclaredDevice
 from procedures.catalog import discover
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Verdict
+from procedures.core.measured import Measured, MeasuredPace
 from procedures.core.recording import AXES, MemoryRecording
 from procedures.core.unit import UnitDeclaration
 from procedures.procedure import Context
@@ -168,6 +169,18 @@ def test_a_world_that_falls_behind_all_the_time_gives_no_delay(context: Context,
     params, recordings = taken(context, SwungUnit(1.0, 2e-3, clock_ppm=ppm))
     with pytest.raises(UnfitRecording, match=r"the unit's samples and the bench's clock part by -?\d"):
         RESPONSE.analyse(recordings, params, context)
+
+
+def test_a_pace_that_was_measured_otherwise_is_refused_before_anything_is_fitted(context: Context) -> None:
+    params, recordings = taken(context, SwungUnit(1.0, 2e-3))
+    for behind_s, scatter_s, words in ((0.5, 0.01, "fell behind"), (-0.5, 0.01, "were ahead of"), (0.5, 0.3, "")):
+        pace = Measured(pace=MeasuredPace(behind_s, scatter_s))
+        made = [MemoryRecording(replace(r.info, measured=pace), r.raw) for r in recordings]
+        if not words:
+            assert RESPONSE.analyse(made, params, context).verdict is Verdict.PASS
+            continue
+        with pytest.raises(UnfitRecording, match=f"the unit's samples {words} the bench's clock by 0.5 s within"):
+            RESPONSE.analyse(made, params, context)
 
 
 def test_a_clock_within_a_quartz_counts_in_the_delays_uncertainty(context: Context) -> None:

@@ -225,6 +225,7 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
             bench.until(lambda: _idle(load), 120)
             print(f"descriptors at the end: {dict(descriptors.kinds[-1].most_common())}")
             good, wrong = checked_recordings(load, bench.client, journal)
+            print(f"samples behind the bench's clock: {_behind(load)}")
         finally:
             bench.end()
         wrong += _of_jobs(load, [*faults.times, *kills], journal, end_s - CALM_S, len(kills))
@@ -234,6 +235,13 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
         late_s = behind.bench.pace.behind_s
         print(f"table: {journal.demands} demands, {journal.requests} requests; {late_s:.1f} s of bench time given up")
     return wrong + (level(samples, descriptors, minutes) if not kill_s else [])
+
+
+def _behind(load: WiredLoad) -> str:
+    """Recordings whose pace was measured, and the worst of them."""
+    paces = [p for r in load.recordings() if (p := (r.get("measured") or {}).get("pace")) is not None]
+    worst = max((abs(p["behind_s"]) for p in paces), default=0.0)
+    return f"{worst:.2f} s at worst within {RECORD_S:g} s, of {len(paces)} recordings whose pace was measured"
 
 
 def _idle(load: WiredLoad) -> bool:

@@ -13,12 +13,15 @@ from procedures.analysis.response.phasors import Response, fitted
 from procedures.analysis.response.trace import Samples
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
+from procedures.core.recording import RecordingInfo
 
 MOST_DIFFERENCE = 1e-3
 """Largest difference of a unit's clock from the bench's, relative; ten times what a quartz oscillator has."""
 CLOCK_SIGMAS = 4.0
 """Standard uncertainties beyond which a difference of the clocks is told."""
 PIECES, LEAST_PIECES = 8, 3
+SCATTERS = 3.0
+"""Scatters of the samples' arrival that are no difference of the clocks."""
 CYCLES, READINGS = 2.0, 8
 """Least number of cycles and of readings in a piece."""
 STEP_SIGMAS = 6.0
@@ -30,6 +33,20 @@ CAUSES = (
     "samples were lost, the unit's rate is not the declared one, or a served world fell behind its time factor; the "
     "delay between the samples and the encoder's readings is none of the unit's"
 )
+
+
+def require_measured_pace(info: RecordingInfo) -> None:
+    """Check the pace that was measured while the samples came, where it was. Raises `UnfitRecording`."""
+    pace = None if info.measured is None else info.measured.pace
+    length_s = info.count / info.rate_hz
+    if pace is None or abs(pace.behind_s) <= max(MOST_DIFFERENCE * length_s, SCATTERS * pace.scatter_s):
+        return
+    label = info.id if info.station is None else info.station.label
+    way = "fell behind" if pace.behind_s > 0.0 else "were ahead of"
+    raise UnfitRecording(
+        f"station {label}: the unit's samples {way} the bench's clock by {abs(pace.behind_s):.3g} s within the "
+        f"recording of {length_s:.6g} s: {CAUSES}"
+    )
 
 
 def require_pace(samples: Samples, response: Response) -> None:

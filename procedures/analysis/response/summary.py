@@ -8,7 +8,7 @@ import numpy as np
 
 from procedures.analysis.least_squares.chi_square import tail_probability
 from procedures.analysis.response.fit import LEVEL, PARAMETERS, Lag, Lags, fit_lags, gain_p_value, model, unwrapped
-from procedures.analysis.response.pace import CLOCK_SIGMAS, require_pace
+from procedures.analysis.response.pace import CLOCK_SIGMAS, require_measured_pace, require_pace
 from procedures.analysis.response.phasors import Response, response
 from procedures.analysis.response.trace import samples_of
 from procedures.core import units
@@ -110,6 +110,7 @@ def analyse_response(
     warnings: list[str] = []
     for recording in recordings:
         channel, directions, frequency_hz = _swung(recording)
+        require_measured_pace(recording.info)
         samples = samples_of(recording, channel, directions)
         found = response(samples, frequency_hz, noise.get(channel))
         require_pace(samples, found)
