@@ -20,7 +20,7 @@ IDLE = timedelta(hours=12)
 LONGEST = timedelta(days=7)
 """Time after which a session ends, used or not."""
 STOPS_AFTER_END = timedelta(days=7)
-"""Time for which a session that has ended by itself still stops a bench: a page that was left open."""
+"""Time after its expiry for which a session may still stop a bench, for a page that was left open."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Session:
         return at < self.over_at
 
     def stops(self, at: datetime) -> bool:
-        """Return whether it still stops a bench: a page left open over a weekend does."""
+        """Return whether the session may still stop a bench, also for some days after it expired."""
         return at < self.over_at + STOPS_AFTER_END
 
 

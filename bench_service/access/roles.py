@@ -4,7 +4,7 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """The four roles, from the least to the most; each has the rights of those before it."""
+    """Roles in ascending order; each has the rights of those before it."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"

@@ -26,7 +26,7 @@ LEAST_S = 1.0
 AXES = ("outer", "middle", "inner")
 ROOM = ("temperature_c", "humidity_percent", "pressure_hpa")
 LEAST_TOLERANCE_DEG = 0.01
-"""Difference from the demand that is no fault of any table [deg]."""
+"""Smallest tolerance that any table gets [deg]."""
 SIGMAS = 10.0
 """Number of standard uncertainties of a commanded angle beyond which an encoder disagrees with the demand: by chance
 no table does so, and a wrong axis, a lost turn or a table that was turned by hand all do.
@@ -136,7 +136,7 @@ def made_by(description: BenchDescription) -> dict[str, Any]:
 
 
 def tolerance_deg(accuracy: TableAccuracy) -> float:
-    """Largest difference of an encoder from its demand that is no fault [deg]."""
+    """Largest allowed |encoder - demand| of any axis [deg]: the greater of 0.01 deg and ten pointing uncertainties."""
     return max(LEAST_TOLERANCE_DEG, SIGMAS * accuracy.pointing_sd_arcsec / 3600.0)
 
 

@@ -53,7 +53,7 @@ class DeviceState:
         if self.powered:
             found.append("the unit is on")
         if self.chamber_target_c not in (None, self.chamber_ambient_c):
-            found.append(f"the chamber is led to {self.chamber_target_c:g} °C")
+            found.append(f"the chamber is commanded to {self.chamber_target_c:g} °C")
         if self.current_ma != 0.0:
             found.append(f"the current source gives {self.current_ma:g} mA")
         if self.fault:
@@ -62,7 +62,7 @@ class DeviceState:
 
     @property
     def safe(self) -> bool:
-        """Table at rest, unit off, chamber led to ambient, no current, and no fault in the way."""
+        """Table at rest, unit off, chamber commanded to ambient, no current, and no fault in the way."""
         return not self.unsafe
 
 

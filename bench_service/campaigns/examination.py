@@ -158,7 +158,7 @@ class Examiner:
         if method.calibrations is not NO_CALIBRATIONS:
             progress.calibrating.add(step.name)
         params, record = method.params.model_validate(step.parameters), self._planner.context(unit, bench).unit
-        checks = method.planned_checks(params, record, progress.plans_of(step.calibrations_of))
+        checks = method.planned_checks(params, record, progress.predicted_uncertainties_of(step.calibrations_of))
         limits = tuple(_previews(checks, params))
         coarse = (
             f"{one.check}: the limit of {one.maximum:g} {one.unit} cannot be resolved, U = "

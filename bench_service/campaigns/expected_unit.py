@@ -34,10 +34,12 @@ class Progress:
     planned: dict[str, tuple[PredictedUncertainty, ...]] = field(
         default_factory=dict[str, tuple[PredictedUncertainty, ...]]
     )
-    """Predicted coefficients of the steps that calibrate, by step."""
+    """Predicted uncertainties of the coefficients of each step that calibrates, by the name of the step."""
 
-    def plans_of(self, steps: Sequence[str]) -> tuple[tuple[PredictedUncertainty, ...], ...]:
-        """Predicted coefficients of some steps, in order; steps without a prediction are left out."""
+    def predicted_uncertainties_of(self, steps: Sequence[str]) -> tuple[tuple[PredictedUncertainty, ...], ...]:
+        """Predicted uncertainties of the coefficients, one tuple per named step that has a prediction, in the order of
+        `steps`; the others are left out.
+        """
         return tuple(self.planned[name] for name in steps if self.planned.get(name))
 
     def expected(self, unit: Unit) -> Unit | None:

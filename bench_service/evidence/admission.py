@@ -1,4 +1,6 @@
-"""Admission of heavy requests: so many at a time, within so much memory; others wait or are refused."""
+"""Admission control of memory-heavy HTTP requests: at most so many at a time, within so much memory; others wait or are
+refused. Not the check of a job: that is `bench_service.jobs.service`.
+"""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,8 +1,8 @@
-"""File object that hands out the bytes written to it, for writers of files that are streamed."""
+"""Write-only file object for writers whose files are streamed while they are written."""
 
 
 class Outbox:
-    """Bytes that were written and not yet taken. It cannot seek, and says so."""
+    """Write-only file object: collects bytes until they are taken; not seekable."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []

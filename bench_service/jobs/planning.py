@@ -1,4 +1,4 @@
-"""Turns a request into a plan: parameters complete, stations laid out, worth predicted, before anything moves."""
+"""Turns a request into a plan before anything moves: complete parameters, stations, and the predicted uncertainty."""
 
 from dataclasses import dataclass, replace
 from typing import Any

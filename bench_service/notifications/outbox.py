@@ -1,4 +1,4 @@
-"""Messages that wait for one target: one file each, so that none is lost with the process, in the order they came."""
+"""Queue of one target's undelivered messages: one file each, oldest first, so that none is lost with the process."""
 
 import logging
 import os
@@ -27,7 +27,9 @@ log = logging.getLogger(__name__)
 
 
 class Outbox:
-    """The waiting messages of a target, and when the next attempt is due."""
+    """Queue of one target's undelivered messages, one file each, so that it survives a restart. It delivers them with
+    growing pauses after failures.
+    """
 
     def __init__(self, folder: Path, target: Mail | Webhook, pages: str) -> None:
         self.target = target

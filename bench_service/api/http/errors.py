@@ -1,4 +1,4 @@
-"""One table from errors to status codes, and problem+json (RFC 9457) for all of them."""
+"""Error handlers: every error answers with a problem document (RFC 9457); status codes: `api/http/status.py`."""
 
 from collections.abc import Sequence
 from http import HTTPStatus

@@ -46,7 +46,9 @@ class IxcomUnit(UnitRecordings):
         return Found(self._identity, found.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Identity that the unit reported when its line was opened; see the port."""
+        """Return maker, part, serial and firmware as read when the channel was opened. Waits for the first frame; a
+        unit without power that never answered has an empty identity. Raises `Disconnected`.
+        """
         await self.found(self._identity)
         return self._identity
 

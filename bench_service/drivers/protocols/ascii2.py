@@ -112,7 +112,9 @@ def state(layout: Layout, answer: bytes) -> State:
 
 
 def acknowledged(answer: bytes) -> None:
-    """Check that an answer is none to a read: what follows a write is not established. Raises `BadAnswer`."""
+    """Check that an answer is short enough to be an acknowledgement, not an answer to a read; its text is not
+    specified. Raises `BadAnswer`.
+    """
     if len(answer) > 16 or len(answer.split()) > 1:
         raise BadAnswer(f"{shown(answer)} is not an acknowledgement of a write")
 

@@ -123,7 +123,9 @@ def text_of(answer: bytes) -> str:
 
 
 def accepted(answer: bytes) -> None:
-    """Check the reply to a set. Raises `Refusal`, `BadAnswer`."""
+    """Check that the chamber accepted a set command. Raises `Refusal` with its error code, `BadAnswer` for a malformed
+    reply.
+    """
     reply(answer, 0)
 
 

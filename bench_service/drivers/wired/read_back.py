@@ -40,7 +40,7 @@ def _unsafe_chamber(section: ChamberSection, reading: ChamberReading) -> str:
         return f"the chamber still runs, to {target:g} °C"
     ambient = None if section.limits is None else section.limits.ambient_c
     if ambient is not None and abs(target - ambient) > SET_POINT_C:
-        return f"the chamber is still led to {target:g} °C, and not to {ambient:g}"
+        return f"the chamber is still commanded to {target:g} °C, and not to {ambient:g}"
     return ""
 
 
@@ -85,13 +85,15 @@ def _on(on: bool) -> str:
 
 
 def _chamber(state: DeviceState, reading: ChamberReading) -> list[str]:
-    """A chamber that stands still is as safe as can be, whatever it was led to: a limiter may have stopped it."""
+    """Faults of the chamber's set point. A chamber that stands still has none, whatever was commanded: a limiter may
+    have stopped it.
+    """
     if reading.target_c is None or (
         state.chamber_target_c is not None and abs(reading.target_c - state.chamber_target_c) <= SET_POINT_C
     ):
         return []
-    left = "standing still" if state.chamber_target_c is None else f"led to {state.chamber_target_c:g} °C"
-    return [f"the chamber is led to {reading.target_c:g} °C, and was left {left}"]
+    left = "standing still" if state.chamber_target_c is None else f"commanded to {state.chamber_target_c:g} °C"
+    return [f"the chamber is commanded to {reading.target_c:g} °C, and was left {left}"]
 
 
 def _table(state: DeviceState, reading: TableReading, description: BenchDescription) -> list[str]:

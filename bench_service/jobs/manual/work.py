@@ -61,7 +61,7 @@ class DemandWork:
             if chamber is None:
                 raise BadParameter("kind", "chamber", "another demand: the bench was opened without its chamber")
             await chamber.command(values["temperature_c"], values["ramp_c_min"])
-            return f"led to {values['temperature_c']:g} °C at {values['ramp_c_min']:g} K/min"
+            return f"commanded to {values['temperature_c']:g} °C at {values['ramp_c_min']:g} K/min"
 
     async def _supply_on(self, values: dict[str, Any]) -> str:
         async with self._order:

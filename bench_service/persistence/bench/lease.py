@@ -117,7 +117,9 @@ def _written_holder(file: int) -> str:
 
 
 class FileLease(BenchLease):
-    """Lease by a locked file, with the holder's process id in it."""
+    """Lease on SQLite: an exclusive `flock` on a file beside the database, which holds the role and process id of the
+    holder. The constructor takes it and raises `BenchBusy`.
+    """
 
     def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -160,7 +162,9 @@ class FileLease(BenchLease):
 
 
 class ServerLease(BenchLease):
-    """Lease by an advisory lock of a connection of its own."""
+    """Lease on Postgres: an advisory lock, held by a connection that is used for nothing else. The constructor takes it
+    and raises `BenchBusy`.
+    """
 
     def __init__(self, url: URL, bench_id: str, role: str) -> None:
         self._key = lease_key(bench_id)

@@ -88,7 +88,7 @@ class SqlResultStore:
                 session.flush()
                 if (
                     content is not None and same is None
-                ):  # a rival with the same content waits here, and then finds this result
+                ):  # a transaction with the same content waits here, and then finds this result
                     session.add(ResultContentRow(content=content, result_id=result.id))
                     session.flush()
                 session.add_all([*quantity_rows(result, taken), *lineage_rows(result), *correction_lineage(result)])

@@ -1,4 +1,4 @@
-"""Reservations of benches and units in SQL. Transactions for the same name take turns: one of two rivals gets it."""
+"""Reservations of benches and units in SQL. Of concurrent transactions for one name, one gets it."""
 
 from datetime import datetime
 from typing import Any
