@@ -94,7 +94,9 @@ class DeviceLog:
         self._note(self._bench.imu.status())
 
     def measured(self) -> Measured:
-        """Means and spreads of the readings so far."""
+        """Return means and spreads of the readings so far: encoders, supply, room and status words; None for each
+        device of which no reading was taken.
+        """
         angles = supply = None
         if self._angles.count:
             mean, spread = TableAngles(*self._angles.mean), TableAngles(*self._angles.spread)
@@ -123,7 +125,9 @@ class DeviceLog:
 
 
 def made_by(description: BenchDescription) -> dict[str, Any]:
-    """Source of a recording: real, mixed or simulated, and device by device; empty where all are simulated."""
+    """Return the origin of a recording and of each device by its name, as the JSON that is stored with the recording;
+    empty where all devices are simulated.
+    """
     if not description.devices:
         return {}
     return {

@@ -11,13 +11,15 @@ LEAST_S = 5.0
 
 
 class SafeDevice(Protocol):
-    """A device that can be made safe."""
+    """A device that can be made safe. Interface of the drivers of a wired bench."""
 
     async def make_safe(self) -> None: ...
 
 
 async def make_safe_together(devices: Mapping[str, SafeDevice], deadlines_s: Mapping[str, float]) -> None:
-    """Make every device safe. Raises an `ExceptionGroup` of the failures, after all have ended or are late."""
+    """Make every device safe at the same time, and wait until each is safe or its deadline [s] is over. Raises an
+    `ExceptionGroup` of the failures, after all have ended or are late.
+    """
 
     async def one(name: str, device: SafeDevice) -> None:
         limit_s = deadlines_s.get(name, LEAST_S)

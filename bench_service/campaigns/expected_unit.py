@@ -1,4 +1,6 @@
-"""The unit as a campaign's earlier steps will leave it: for previews of steps that need their results."""
+"""A unit as earlier steps of a campaign will leave it, with planned calibrations, for previews of steps that need
+them.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -43,7 +45,9 @@ class Progress:
         return tuple(self.planned[name] for name in steps if self.planned.get(name))
 
     def expected(self, unit: Unit) -> Unit | None:
-        """The unit with the calibrations that are planned in place of those that it lacks; None where it lacks more."""
+        """Return the unit with planned calibrations in place of those that it lacks; None where it lacks more than are
+        planned.
+        """
         made: Mapping[str, TriadCalibration] = {}
         for uncertainties in self.planned.values():
             made = {**made, **_nominal(uncertainties)}

@@ -46,7 +46,8 @@ class Outbox:
             self._book.write_text("\n".join(self._kept) + "\n", encoding="utf-8")
 
     def put(self, message: Message) -> None:
-        """Keep a message for the target, where it wants this kind; the same thing is kept once.
+        """Write a message into a file of the queue, if the target wants its kind; a message with a known key is left
+        out.
 
         An urgent one is tried at once, also while the target is left alone after a failure.
         """
@@ -69,7 +70,8 @@ class Outbox:
             self._due, self._pause = datetime.min.replace(tzinfo=now().tzinfo), FIRST_PAUSE
 
     def send(self, at: datetime) -> int:
-        """Deliver what waits and is due; the number of messages that are still waiting.
+        """Deliver the messages that are due, and return the number of those that still wait. Blocks while the target
+        answers.
 
         Urgent ones go first, each by itself, and neither count for `per_hour` nor wait for it.
         """
