@@ -33,7 +33,9 @@ class DrivingSession(Protocol):
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Why a bench could not be made safe: one sentence a failure; `busy`: another process has the devices' link."""
+    """Reasons for which a bench could not be made safe: one sentence a failure; `busy`: another process has the
+    devices' link.
+    """
 
     reasons: tuple[str, ...]
     busy: bool = False

@@ -23,7 +23,7 @@ class Listener(Protocol):
 
 
 class SafetyBooks(StopBooks, Protocol):
-    """What the supervisor stores in the database: stops, confirmations, notes. Interface; every verb raises
+    """Records of the supervisor in the database: stops, confirmations, notes. Interface; every verb raises
     `ServiceError` if the database does not answer.
     """
 

@@ -16,5 +16,5 @@ class UnitNoteStore(Protocol):
         ...
 
     def list(self, unit: str, *, after: str | None = None, limit: int = 50) -> Page[UnitNote]:
-        """List a unit's remarks, newest first."""
+        """Return one page of a unit's remarks, newest first."""
         ...

@@ -121,7 +121,7 @@ class Dispatcher:
         return self._lease.held()
 
     def shut_down(self) -> None:
-        """Claim no more jobs, end manual mode, and wait for the thread. The engine ends the running job."""
+        """Claim no more jobs, and end manual mode, waiting until its bench is safe. The engine ends the running job."""
         self._ending.set()
         self._wake.set()
         if self._manual is not None:

@@ -162,9 +162,8 @@ class JobRunner:
         return StepOutcome()
 
     def stop_now(self) -> None:
-        """Leave the running job's station and make the bench safe, also while the job's own thread hangs.
-
-        Called by the stop guard. The job's end is noted by its own thread, as soon as possible.
+        """Leave the running job's station and make the bench safe, also while the job's own thread hangs. Called by the
+        stop guard; the job's end is noted by its own thread, as soon as possible.
         """
         session = self._session
         if session is None:

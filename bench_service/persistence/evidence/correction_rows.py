@@ -20,7 +20,7 @@ CORRECTION = TypeAdapter(UnitCorrection)
 
 
 def correction_of_row(row: CorrectionRow, decisions: Sequence[CorrectionDecisionRow] = ()) -> StoredCorrection:
-    """Convert a row with its decisions, oldest first, to its correction."""
+    """Convert a row with its decisions, oldest first, to a stored correction."""
     return copied(
         StoredCorrection,
         row,
@@ -34,7 +34,7 @@ def correction_of_row(row: CorrectionRow, decisions: Sequence[CorrectionDecision
 def corrections_where(
     session: Session, *conditions: ColumnElement[bool] | InstrumentedAttribute[bool]
 ) -> list[StoredCorrection]:
-    """Corrections under some conditions with their decisions, oldest first."""
+    """Return the corrections that meet all conditions, with their decisions, oldest first."""
     rows = session.scalars(select(CorrectionRow).where(*conditions).order_by(CorrectionRow.id)).all()
     decisions: dict[str, list[CorrectionDecisionRow]] = defaultdict(list)
     if rows:
@@ -52,7 +52,7 @@ def check_corrections(session: Session, result: StoredResult) -> None:
 
 
 def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
-    """Build the rows that link a result to the corrections that it used."""
+    """Return new rows that link a result to the corrections that it used."""
     return [
         ResultCorrectionRow(result_id=result.id, position=position, correction_id=correction_id)
         for position, correction_id in enumerate(result.corrections)
@@ -60,7 +60,7 @@ def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
 
 
 def retire_current(session: Session, unit: str | None, kind: str) -> None:
-    """Unset the unit's current correction of that kind."""
+    """Make the unit's current correction of that kind no longer current, in this transaction."""
     session.execute(
         update(CorrectionRow)
         .where(CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current)
@@ -71,7 +71,9 @@ def retire_current(session: Session, unit: str | None, kind: str) -> None:
 def add_corrections(
     session: Session, result: StoredResult, corrections: Sequence[UnitCorrection], make_current: bool
 ) -> None:
-    """Add to a unit's history; of two that become current at once, the index lets one wait and the store try again."""
+    """Add a result's corrections to a unit's history; of two that become current at once, the index lets one wait and
+    the store retries.
+    """
     for correction in corrections:
         if make_current:
             retire_current(session, result.unit, correction.kind)

@@ -51,7 +51,7 @@ from procedures.core.unit_correction import UnitCorrection
 
 
 class SqlResultStore:
-    """SQL implementation of `bench_service.jobs.stores.ResultStore`."""
+    """SQL implementation of `bench_service.evidence.results.ResultStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
