@@ -222,7 +222,7 @@ def create_app(
     rules: door.Door,
     proxies: identify.Proxies,
 ) -> FastAPI:
-    """The application around a service that is open; `at_end` is called when the server shuts down.
+    """Return the FastAPI application around a service that is open; `at_end` is called when the server shuts down.
 
     `rules`: decide which requests are let in; `proxies`: those that authenticate people.
     """

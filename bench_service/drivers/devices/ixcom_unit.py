@@ -25,7 +25,7 @@ class IxcomSection(WireUnitLink):
 
 
 class IxcomUnit(UnitRecordings):
-    """Unit whose rates are 32-bit floats; a recording holds counts of the declared scales."""
+    """Unit over iXCOM whose rates are 32-bit floats; a recording holds counts of the declared scales."""
 
     def __init__(self, section: IxcomSection, context: DriverContext) -> None:
         """Set up. Raises `Misconfigured` where the declared unit cannot be an iXCOM one."""

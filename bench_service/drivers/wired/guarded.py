@@ -59,7 +59,7 @@ class GuardedTurntable(Guarded):
 
 
 class LaunchingSupply:
-    """A supply that notes when the unit was switched on; every other verb is its own."""
+    """A supply that records when the unit was switched on; every other verb is its own."""
 
     def __init__(self, supply: Any, now_s: Callable[[], float]) -> None:
         self._supply = supply

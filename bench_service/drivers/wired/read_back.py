@@ -20,7 +20,7 @@ CURRENT_MA = 1e-3
 
 
 def unsafe_reading(kind: Kind, section: DeviceSection, reading: Any) -> str:
-    """The reason why a device that was made safe reads back as unsafe; empty: it is safe."""
+    """Return the reason why a device that was made safe reads back as unsafe; empty: it is safe."""
     if isinstance(reading, TableReading) and reading.moving:
         return "the turntable still moves"
     if isinstance(reading, SupplyReading) and reading.on:
@@ -45,7 +45,7 @@ def _unsafe_chamber(section: ChamberSection, reading: ChamberReading) -> str:
 
 
 def differences(state: DeviceState, readings: dict[Kind, Any], description: BenchDescription) -> tuple[str, ...]:
-    """Differences between the register and the devices themselves, a sentence each.
+    """Return the differences between the register and the devices themselves, a sentence each.
 
     Angles are compared to within the table's accuracy; whole turns count, except of an axis that turns endlessly.
     """
@@ -63,7 +63,7 @@ def differences(state: DeviceState, readings: dict[Kind, Any], description: Benc
 
 
 def as_read(readings: dict[Kind, Any]) -> dict[str, Any]:
-    """Fields of the register by what the devices say."""
+    """Return the fields of the register as the devices' readings give them."""
     changes: dict[str, Any] = {}
     for reading in readings.values():
         if isinstance(reading, TableReading):
