@@ -57,7 +57,7 @@ class StopView(BaseModel):
 
 
 class StopPage(BaseModel):
-    """Stops of a bench, newest first, with those that were released."""
+    """One page of a bench's stops, newest first, with those that were released."""
 
     items: list[StopView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")

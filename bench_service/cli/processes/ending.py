@@ -15,7 +15,7 @@ OUTPUTS = (1, 2)
 
 
 def ending_on_signals() -> threading.Event:
-    """Create an event that SIGTERM, SIGINT or SIGHUP sets from now on. Must be called in the main thread."""
+    """Return an event that SIGTERM, SIGINT or SIGHUP sets from now on. Must be called in the main thread."""
     ending = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -1,4 +1,6 @@
-"""What drivers of devices on a wire share: the greeting of a new line, its times, and the sentence for a refusal."""
+"""Common parts of drivers of devices on a wire: the greeting of a new line, its times, and the sentence for a
+refusal.
+"""
 
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeVar
