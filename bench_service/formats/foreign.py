@@ -28,6 +28,6 @@ _KINDS: tuple[tuple[bytes, str], ...] = (
 
 
 def foreign_kind(start: bytes) -> str | None:
-    """The kind of a file that begins so, and the way out; None: it may be text."""
+    """Return the kind of a file that begins so, and the way to a readable table; None: it may be text."""
     begin = start.lstrip(b" \t\r\n") if start[:1] in b" \t\r\n" else start
     return next((words for magic, words in _KINDS if begin.startswith(magic)), None)

@@ -68,12 +68,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Zipped":
-    """Open an archive. Raises `UnreadableFile`."""
+    """Return a reader of a zip archive of texts. Raises `UnreadableFile`."""
     return Zipped(stream, name)
 
 
 class Zipped:
-    """A zip archive of texts."""
+    """Reader of one zip archive of texts: a KITTI drive, or a table for each text. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name
@@ -104,7 +104,7 @@ class Zipped:
         return cast(BinaryIO, self._archive.open(member))
 
     def tables(self) -> list[LogTable]:
-        """List the drive, or the texts."""
+        """Return the drive as one table, or each text as one."""
         if self._oxts:
             return [self._drive()]
         return [_text_table(member, found) for member, found in self._looks.items()]
@@ -124,7 +124,9 @@ class Zipped:
         return LogTable("oxts", every, clocks, None, len(self._oxts), notes)
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the rows of a drive, or of a text. Raises `UnreadableFile`."""
+        """Yield blocks of the rows of a drive, or of a text: for each named column its values, (n,). Raises
+        `UnreadableFile`.
+        """
         try:
             yield from self._drive_rows(columns) if self._oxts else self._text_rows(table, columns)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
