@@ -6,7 +6,7 @@ from pydantic import Field
 
 from procedures.analysis.calibration.summary import TriadSummary
 from procedures.analysis.calibration.table_errors import TableUncertainty
-from procedures.analysis.calibration.triad_analysis import analyse_means
+from procedures.analysis.calibration.triad_analysis import analyse_means, suspected
 from procedures.analysis.own_axes import own_axis_check
 from procedures.analysis.turns.ferraris import analyse_ferraris, rest_means
 from procedures.analysis.turns.summary import WholeTurns
@@ -45,7 +45,8 @@ def calibrated(
 ) -> Result:
     """Both triads. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
     gyro = analyse_ferraris(recordings, site, table, unit.gyro if unit else None)
-    force, _ = analyse_means(rest_means(recordings), site, table, unit.accelerometer if unit else None)
+    at_rest = analyse_means(rest_means(recordings), site, table, unit.accelerometer if unit else None)
+    (force,) = suspected([at_rest])
     checks = (*_gyro_checks(gyro, limits), *_force_checks(force, limits))
     known = (("gyro", gyro.noise_known), ("accelerometer", force.noise_known))
     warnings = tuple(

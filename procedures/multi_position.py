@@ -202,17 +202,17 @@ def quantities(params: FitParameters) -> tuple[str, ...]:
 
 
 def report(result: Result) -> Report:
-    """Coefficients, further terms, checks, residuals and magnitudes."""
+    """Coefficients, further terms, checks, thermal correction where it was applied, residuals and magnitudes."""
     magnitudes = [t.magnitudes for t in result.triads]
     tables = [pictures.triad_table(t) for t in result.triads]
     tables += [_term_table(e) for e in result.extended]
     tables += [pictures.budget_table(t.calibration.triad, t.budgets) for t in result.triads if t.budgets]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the positions")]
+    thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
-    return Report(
-        sections=(*tables, *saved_tables(result.dwells), *figures, *(pictures.station_table(m) for m in magnitudes))
-    )
+    stations = [pictures.station_table(m) for m in magnitudes]
+    return Report(sections=(*tables, *saved_tables(result.dwells), *thermal, *figures, *stations))
 
 
 def _extended(triad: str, means: StationMeans, fit: ExtraFit) -> Extended:

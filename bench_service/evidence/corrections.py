@@ -8,6 +8,7 @@ from typing import Protocol
 
 from bench_service.model.calibrations import Act, Approval, Decider, Decision
 from bench_service.model.records import Idempotency, Page
+from procedures.core.limits import Verdict
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
 
 
@@ -22,11 +23,34 @@ class StoredCorrection:
     current: bool
     correction: UnitCorrection
     simulated: bool
+    verdict: Verdict
+    """Verdict of the result that gave it."""
+    of_job: bool
+    """True where a job gave it as its own result; False for a second analysis and for a method."""
     approval: Approval = Approval.OPEN
     valid_until: datetime | None = None
     """End of its validity; None: it has none."""
     decisions: tuple[Decision, ...] = ()
     """All decisions about it, oldest first; `calibration_id` of each is this correction's id."""
+
+    @property
+    def why_not_current(self) -> str:
+        """Reason why it is not its kind's current one, with the way out; empty where it is."""
+        what = f"correction {self.id} of the kind {self.correction.kind!r}"
+        if self.current:
+            return ""
+        if any(d.act is Act.CHOSEN for d in self.decisions):
+            return (
+                f"{what} was chosen by a person, and another one has taken its place since; choose it again to use it"
+            )
+        if self.verdict is not Verdict.PASS:
+            return (
+                f"{what} comes from result {self.result_id}, whose verdict is {self.verdict}: only one of a job that "
+                "passed becomes current by itself; choose it with a remark to use it nevertheless"
+            )
+        if not self.of_job:
+            return f"{what} comes from a second analysis or a method: it counts only where a person chooses it"
+        return f"{what} was current until another one took its place; choose it to use it again"
 
     def unusable(self, at: datetime) -> str:
         """Return the reason why it may not be used at a time, with the way out; empty where it may."""

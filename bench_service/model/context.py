@@ -28,7 +28,7 @@ def context_document(context: Context) -> dict[str, Any]:
 def context_of(job: Job, calibrations: Callable[[Sequence[str]], Sequence[StoredCalibration]]) -> Context:
     """Return a job's context, read back from JSON, with the `calibrations` that it names. Raises `NotUnderstood`."""
     try:
-        context = CONTEXT.validate_python(job.context)
+        context = CONTEXT.validate_python({**job.context, "unit": unit_document(job.context)})
     except (ValueError, DomainError) as error:
         raise NotUnderstood(job.id, job.code_version, error) from error
     unit = context.unit
@@ -41,5 +41,18 @@ def withheld_calibration(job: Job, triads: Sequence[str]) -> str:
     """Return the reason why a calibration that a job needs may not be used, as its context says; empty where all
     may.
     """
-    unit = job.context.get("unit") or {}
-    return "; ".join(entry["why"] for entry in unit.get("withheld") or () if entry["triad"] in triads)
+    unit = unit_document(job.context)
+    return "; ".join(entry["why"] for entry in unit.get("withheld") or () if entry["subject"] in triads)
+
+
+def unit_document(context: dict[str, Any]) -> dict[str, Any]:
+    """The unit of a stored context as this release reads it; {} where there is none.
+
+    Contexts of earlier versions call the subject of what was withheld its triad, also where it was a correction.
+    """
+    unit: dict[str, Any] = context.get("unit") or {}
+    withheld: list[dict[str, Any]] = unit.get("withheld") or []
+    if not any("triad" in entry for entry in withheld):
+        return unit
+    renamed = [{"subject" if key == "triad" else key: value for key, value in entry.items()} for entry in withheld]
+    return {**unit, "withheld": renamed}

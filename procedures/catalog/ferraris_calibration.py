@@ -15,7 +15,13 @@ from procedures.analysis.calibration.plan import triad_plan
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.own_axes import OWN_AXES
-from procedures.analysis.turns.ferraris import END_REST_S, face_stations, ferraris_estimator, rests_and_turns
+from procedures.analysis.turns.ferraris import (
+    END_REST_S,
+    face_stations,
+    ferraris_estimator,
+    ferraris_flaws,
+    rests_and_turns,
+)
 from procedures.analysis.turns.plan import coefficient_names
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -93,7 +99,8 @@ def _gyro(params: Params, context: Context, stations: Sequence[Station]) -> list
         return []
     site, known = params.site(context), context.unit.known_matrix("gyro")
     motion = rests_and_turns(stations, spans[:, 1] - spans[:, 0], site)
-    made = ferraris_estimator(motion, noise, params.table(site), np.eye(3) if known is None else known)
+    flaws = ferraris_flaws(motion, params.table(site))
+    made = ferraris_estimator(motion, noise, flaws, np.eye(3) if known is None else known)
     total, own = made.covariance.diagonal() ** 0.5, made.noise_covariance.diagonal() ** 0.5
     table = (made.table_per_sd**2).sum(axis=1) ** 0.5
     parts = zip(coefficient_names(()), total.tolist(), own.tolist(), table.tolist(), strict=True)

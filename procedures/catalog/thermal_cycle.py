@@ -251,7 +251,10 @@ def _require_possible(params: Params, context: Context) -> None:
 def _require_correction(params: Params, context: Context) -> None:
     if params.correction == "current" and context.unit.thermal_correction is None:
         why = context.unit.why_withheld("thermal")
-        own = why or f"unit {context.unit.serial} has no thermal correction to judge"
+        own = why or (
+            f"unit {context.unit.serial} has no current thermal correction to judge; one that failed counts only where "
+            "it is chosen"
+        )
         raise BadParameter("correction", "current", own)
 
 

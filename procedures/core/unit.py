@@ -95,11 +95,11 @@ class UnitDeclaration:
 
 
 @dataclass(frozen=True)
-class WithheldCalibration:
+class Withheld:
     """A calibration or correction that would be in use, but was rejected or has expired."""
 
-    triad: str
-    """Triad of a calibration, or kind of a correction."""
+    subject: str
+    """Triad of a calibration ("gyro"), or kind of a correction ("gyros"): no triad has the name of a kind."""
     id: str
     why: str
     """Sentence that says why it is not used, and what to do."""
@@ -120,7 +120,7 @@ class Unit:
     """The current calibrations, at most one a triad; empty before the first."""
     calibration_ids: tuple[str, ...] = ()
     """Ids of the stored calibrations in use, in the order of `calibrations`."""
-    withheld: tuple[WithheldCalibration, ...] = field(default=(), repr=False)
+    withheld: tuple[Withheld, ...] = field(default=(), repr=False)
     """Current calibrations and corrections that may not be used."""
     thermal_correction: ThermalCorrection | None = field(default=None, repr=False)
     """The current correction of the kind "thermal", or None."""
@@ -140,7 +140,7 @@ class Unit:
     def calibration(self, triad: str) -> TriadCalibration | None:
         """The current calibration of a triad, or None. Raises `NoCalibration` for one that is rejected or expired."""
         for withheld in self.withheld:
-            if withheld.triad == triad:
+            if withheld.subject == triad:
                 raise NoCalibration(f"unit {self.serial}: {withheld.why}")
         return next((c for c in self.calibrations if c.triad == triad), None)
 
@@ -161,7 +161,7 @@ class Unit:
 
     def why_withheld(self, kind: CorrectionKind) -> str:
         """The reason why the current correction of a kind may not be used; empty where it may, or there is none."""
-        return next((w.why for w in self.withheld if w.triad == kind), "")
+        return next((w.why for w in self.withheld if w.subject == kind), "")
 
     def triad(self, triad: str) -> TriadRecord | None:
         """The record of a triad by name."""

@@ -37,7 +37,10 @@ class UnitRecords:
     def print_newest(
         self, context: typer.Context, unit: str, query: dict[str, Any], server: str | None, as_json: bool
     ) -> None:
-        """Print a unit's newest records, and why a current one is not usable; None leaves a condition out."""
+        """Print a unit's newest records, why a current one is not usable and why another is not current.
+
+        A condition of the query that is None is left out.
+        """
         given = {name: value for name, value in query.items() if value is not None}
         with connect(context.obj, server, drive=False) as client:
             items = call(client, "GET", self.path(unit), ("items",), params=given)["items"]
@@ -45,6 +48,8 @@ class UnitRecords:
         for one in () if as_json else items:
             if one["current"] and one["unusable"]:
                 console.print(one["unusable"], style="yellow", soft_wrap=True)
+            if why := one.get("not_current"):  # calibrations have none: their verdict and origin say it
+                console.print(why, style="dim", soft_wrap=True)
 
     def post(self, context: typer.Context, path: str, body: dict[str, Any], server: str | None, as_json: bool) -> None:
         """Send a decision to the service, and print the record as it is then. Raises `Refused`."""

@@ -107,12 +107,12 @@ def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
 def correction_table(corrections: list[dict[str, Any]]) -> Table:
     """Return the table of corrections: the result that gave each, which one of its kind is current, and how long."""
     table = Table()
-    for column in ("correction", "kind", "made", "result", "current", "approval", "valid until"):
+    for column in ("correction", "kind", "made", "result", "verdict", "current", "approval", "valid until"):
         table.add_column(column, overflow="fold")
     for one in corrections:
         current = ("current, not usable" if one["unusable"] else "current") if one["current"] else ""
         until = one["valid_until"] or "–"
-        cells = (one["made_at"][:19], one["result"], current, one["approval"], until[:19])
+        cells = (one["made_at"][:19], one["result"], one["verdict"], current, one["approval"], until[:19])
         table.add_row(one["id"], one["kind"], *cells)
     return table
 

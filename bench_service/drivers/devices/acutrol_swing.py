@@ -100,7 +100,7 @@ class SwingingTable(WatchedTable):
                 raise DeviceFault(f"the {sinusoid.axis} axis swung by {largest:.4g} deg where {wanted} were demanded")
 
     async def _reading(self, index: int) -> AxisState:
-        """Read the axes, and keep the reading with the interval of its question."""
+        """Read the axes, and keep the reading with the interval of its request."""
         asked_s = self._clock.now_s()
         states = await self._states()
         heard_s = self._clock.now_s()

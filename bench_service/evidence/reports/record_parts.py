@@ -9,6 +9,7 @@ from bench_service.evidence.reports.noise_parts import noise_change, origin
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.printed.document import Block, PrintedTable
 from bench_service.model.calibrations import StoredCalibration
+from bench_service.model.context import unit_document
 from bench_service.model.errors import NotFound
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
@@ -66,7 +67,7 @@ def _corrections(stores: EvidenceStores, result: StoredResult) -> dict[str, str]
 def _units(catalogue: Catalogue, result: StoredResult, of_job: bool) -> tuple[Unit | None, Unit | None]:
     """The unit as the job found it, and as the job's own result left it; None where this release cannot read one."""
     try:
-        before = UNIT.validate_python(result.context["unit"])
+        before = UNIT.validate_python(unit_document(result.context))
         if not of_job:
             return before, before
         entry = catalogue.procedure(result.name)

@@ -106,12 +106,13 @@ def _corrections(corrections: tuple[StoredCorrection, ...]) -> Iterator[Block]:
             c.correction.kind,
             c.id,
             c.result_id,
+            c.verdict.value,
             "in use" if c.current else "",
             c.approval.value,
         )
         for c in corrections
     )
-    yield PrintedTable("", ("day", "kind", "correction", "result", "", "approval"), rows)
+    yield PrintedTable("", ("day", "kind", "correction", "result", "verdict", "", "approval"), rows)
 
 
 def _results(results: tuple[StoredResult, ...]) -> Iterator[Block]:
