@@ -47,7 +47,7 @@ class RecordingSelection(Request):
     ids: list[str] = Field(default_factory=list[str], max_length=20_000, description="Only these recordings")
 
     def query(self) -> Selection:
-        """Convert to the query of the stores."""
+        """Return the conditions in the form that the stores take."""
         labels = tuple(map(LabelSought.parse, self.labels))
         return copied(Selection, self, search=copied(Search, self, labels=labels), ids=tuple(self.ids))
 

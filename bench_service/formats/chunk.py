@@ -26,7 +26,7 @@ ENCODINGS = {"int32": "DELTA_BINARY_PACKED", "float64": "BYTE_STREAM_SPLIT"}
 
 
 class UnreadableChunk(Exception):
-    """The payload is not the requested chunk."""
+    """Raised where the payload is not the requested chunk, or cannot be decoded."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def rows_per_chunk(channels: int, dtype: SampleType) -> int:
 
 
 def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> bytes:
-    """Encode samples, shape (n, channels), as Parquet with one column for each channel."""
+    """Return samples, shape (n, channels), as the bytes of a Parquet file with one column for each channel."""
     encoding = ENCODINGS[samples.dtype.name]
     schema = pa.schema(
         [pa.field(name, pa.from_numpy_dtype(samples.dtype), nullable=False) for name in names],
@@ -73,7 +73,7 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
 
 
 def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
-    """Decode the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
+    """Return the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
     try:
         table = pq.ParquetFile(pa.BufferReader(payload)).read(columns=list(names), use_threads=False)
         columns = [table.column(name).to_numpy() for name in names]

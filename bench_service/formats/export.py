@@ -65,7 +65,8 @@ def extract(
     start_s: float | None = None,
     stop_s: float | None = None,
 ) -> Extract:
-    """Select a part by names and by time since the first sample [s]; a sample belongs to its beginning.
+    """Return a part of a recording, by names of channels and by time since its first sample [s]; a sample belongs to
+    its beginning.
 
     Raises `MissingChannel`, `BadParameter`.
     """
@@ -104,7 +105,7 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
 
 
 def describe(part: Extract) -> dict[str, str]:
-    """Describe the recording for the reader of the file, as text."""
+    """Return the description of the recording for the reader of the file, as name -> text."""
     info = part.info
     return {
         "recording": info.id,

@@ -19,14 +19,14 @@ CONTEXT = TypeAdapter(Context)
 
 
 def context_document(context: Context) -> dict[str, Any]:
-    """The context as JSON, without the coefficients of calibrations that have an id."""
+    """Return the context of a job as a JSON object, without the coefficients of calibrations that have an id."""
     unit = context.unit
     stored = len(unit.calibration_ids) == len(unit.calibrations)
     return CONTEXT.dump_python(context, mode="json", exclude={"unit": {"calibrations"}} if stored else None)
 
 
 def context_of(job: Job, calibrations: Callable[[Sequence[str]], Sequence[StoredCalibration]]) -> Context:
-    """Read a job's context back from JSON, with the `calibrations` that it names. Raises `NotUnderstood`."""
+    """Return a job's context, read back from JSON, with the `calibrations` that it names. Raises `NotUnderstood`."""
     try:
         context = CONTEXT.validate_python({**job.context, "unit": unit_document(job.context)})
     except (ValueError, DomainError) as error:
@@ -38,7 +38,9 @@ def context_of(job: Job, calibrations: Callable[[Sequence[str]], Sequence[Stored
 
 
 def withheld_calibration(job: Job, triads: Sequence[str]) -> str:
-    """Reason why a calibration that a job needs may not be used, as its context says; empty where all may."""
+    """Return the reason why a calibration that a job needs may not be used, as its context says; empty where all
+    may.
+    """
     unit = unit_document(job.context)
     return "; ".join(entry["why"] for entry in unit.get("withheld") or () if entry["subject"] in triads)
 

@@ -17,13 +17,13 @@ POLICY = (
 
 @router.get("/docs")
 def docs(request: Request) -> HTMLResponse:
-    """Page of every operation of the API, to be read and tried."""
+    """Return the HTML page of every operation of the API, to be read and tried."""
     return templates.TemplateResponse(request, "docs.html", headers={"Content-Security-Policy": POLICY})
 
 
 @router.get("/openapi.json")
 def openapi_document(request: Request) -> JSONResponse:
-    """The API's document."""
+    """Return the OpenAPI document of the API as JSON."""
     return JSONResponse(request.app.openapi())
 
 

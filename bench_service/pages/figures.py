@@ -15,12 +15,12 @@ _elsewhere: list[WorkProcesses] = []
 
 
 def warm_up() -> None:
-    """Load matplotlib in the processes that draw, so that the first plot is not delayed."""
+    """Have the drawing processes load matplotlib, so that the first plot is not delayed. Returns at once."""
     svg(SMALLEST)
 
 
 def draw_in(processes: WorkProcesses | None) -> None:
-    """Draw in another process from now on; None: in this one."""
+    """Have figures drawn in these processes from now on; None: in this process."""
     _elsewhere[:] = [] if processes is None else [processes]
 
 

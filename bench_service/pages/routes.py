@@ -108,7 +108,7 @@ def _notes(events: tuple[Event, ...]) -> list[dict[str, Any]]:
 
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
-    """Page of the benches, their units and the latest jobs."""
+    """Return the HTML page of the benches, their units and the latest jobs."""
     service = service_of(request)
     queued = service.stores.queue.lengths()
     return _page(
@@ -132,7 +132,9 @@ def home(request: Request) -> HTMLResponse:
 
 @router.get("/jobs/{job_id}")
 def job_page(job_id: str, request: Request) -> HTMLResponse:
-    """Page of a job: progress, stations, recordings, and its result once there is one."""
+    """Return the HTML page of a job: progress, stations, recordings, and its result once there is one. Raises
+    `NotFound`.
+    """
     service = service_of(request)
     job_id = job_id_of(service.stores, job_id)
     last_event, _ = service.stores.jobs.last_event(job_id)  # before the job: what comes later reloads the page
@@ -161,7 +163,7 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/results/{result_id}")
 def result_page(result_id: str, request: Request) -> HTMLResponse:
-    """Page of a result: verdict, checks, tables, plots, lineage."""
+    """Return the HTML page of a result: verdict, checks, tables, plots, lineage. Raises `NotFound`."""
     service = service_of(request)
     result = service.stores.results.get(result_id)
     numbers = service.stores.jobs.numbers([result.job_id] if result.job_id else [])
@@ -170,7 +172,7 @@ def result_page(result_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/units/{serial}")
 def unit_page(serial: str, request: Request) -> HTMLResponse:
-    """Page of a unit: its record, its calibrations and its correction sets."""
+    """Return the HTML page of a unit: its record, its calibrations and its correction sets. Raises `NotFound`."""
     service = service_of(request)
     unit = service.stores.units.unit(serial)
     return _page(

@@ -28,7 +28,9 @@ def found_and_left(
     given: Sequence[StoredCalibration],
     job: Job | None,
 ) -> Iterator[Block]:
-    """Return what was in use when the job began next to what the result gave, and noise where it changed."""
+    """Yield the section on what was in use when the job began next to what the result gave, and noise where it
+    changed.
+    """
     unit = result.context.get("unit")
     if not unit:
         return
