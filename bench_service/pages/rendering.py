@@ -1,5 +1,6 @@
 """Rendering shared by all pages: templates, the filters in them, and the service behind the request."""
 
+import json
 import re
 from datetime import UTC, datetime
 from math import isfinite
@@ -39,7 +40,15 @@ def _shell(request: Request) -> dict[str, Any]:
         benches = list(service.benches.ids())
     except ServiceError:
         benches = [] if service.live.own is None else [service.live.own]
-    return {"language": language, "languages": LANGUAGES, "words": words_address(language), "stop_benches": benches}
+    titles = service.catalogue.titles()
+    return {
+        "language": language,
+        "languages": LANGUAGES,
+        "words": words_address(language),
+        "stop_benches": benches,
+        "titled": lambda name: translated(titles.get(name, name)),
+        "titles": json.dumps({name: translated(title) for name, title in titles.items()}, ensure_ascii=False),
+    }
 
 
 templates = Jinja2Templates(Path(__file__).parent / "templates", context_processors=[_shell])

@@ -72,6 +72,21 @@ def test_columns_that_no_name_tells_are_named_by_the_person(window: Watched, tmp
     expect(page.locator("#main")).to_contain_text("50 Hz")
 
 
+def test_a_unit_that_no_bench_has_cannot_be_started_and_the_page_says_why_once(window: Watched) -> None:
+    window.expected = re.compile("status of 422")
+    page = window.open("/start?unit=PAPER-9&procedure=calibration_12_orientations")
+    expect(page.locator("#nowhere")).to_contain_text("has no unit 'PAPER-9'")
+    expect(page.locator("#refusal")).to_contain_text("has no unit 'PAPER-9'")
+    expect(page.locator("#cards")).not_to_contain_text("PAPER-9")
+    expect(page.get_by_role("button", name="Start", exact=True)).to_be_disabled()
+    expect(page.get_by_role("button", name="Calibrate, then verify")).to_be_disabled()
+    page.locator("#unit").fill("SIM-0001")
+    page.locator("#unit").press("Tab")
+    expect(page.get_by_role("button", name="Calibrate, then verify")).to_be_enabled()
+    expect(page.locator("#nowhere")).to_be_hidden()
+    expect(page.locator("#refusal")).to_be_empty()
+
+
 def test_a_campaign_is_made_started_and_scheduled_by_forms(window: Watched, service: BenchProcess) -> None:
     page = window.open("/campaigns")
     page.get_by_role("button", name="New campaign").click()
