@@ -14,6 +14,7 @@ from markupsafe import Markup, escape
 from bench_service.access.identity import Identity, Proof
 from bench_service.formats.printed import digits
 from bench_service.model.errors import ServiceError
+from bench_service.pages import figures
 from bench_service.pages.languages import (
     LANGUAGE,
     LANGUAGES,
@@ -33,6 +34,7 @@ def service_of(request: Request) -> BenchService:
 
 def _shell(request: Request) -> dict[str, Any]:
     """Frame of every page around its content. It needs no database: the stop stands on pages of errors, too."""
+    figures.expect()
     language = language_of(request)
     LANGUAGE.set(language)
     service = service_of(request)
