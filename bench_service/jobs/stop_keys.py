@@ -20,7 +20,7 @@ KEPT_S = 600.0
 
 @dataclass
 class KeyedStop:
-    """The stop request of one key, and whether it was answered."""
+    """The stop request of one idempotency key, and whether it was answered."""
 
     word: StopWord
     answered: bool = False
@@ -29,7 +29,7 @@ class KeyedStop:
 
 
 class StopKeys:
-    """The stop requests of the latest keys. For any thread."""
+    """The stop requests of the latest idempotency keys, in the memory of this process. For any thread."""
 
     def __init__(self) -> None:
         self._mutex = Lock()
