@@ -53,7 +53,9 @@ class StopWord:
         if at.tzinfo is None:
             raise ValueError(f"at = {document['at']!r}: a time with its zone is expected")
         known = {each.name for each in fields(cls)}
-        return cls(**{name: value for name, value in document.items() if name in known} | {"at": at})
+        given: dict[str, Any] = {name: value for name, value in document.items() if name in known}
+        given["at"] = at
+        return cls(**given)
 
 
 DAMAGED = StopWord("a record of the stop channel cannot be read", "the stop channel", "books", "damaged", booked=True)
