@@ -2,8 +2,8 @@
 
 A check that is an estimate of zero with the predicted standard uncertainty u has the mean square u² over runs; a root
 mean square of ν degrees of freedom, such as δ/√3 or the scatter of three launches, ``expected² + u²``. Over n
-independent runs the observed mean square over that is χ²/(ν·n) with ν·n degrees of freedom (ν = 1 of an estimate), which
-gives the interval. A value that is itself a claim ("3σ") is compared by its mean. Tests of significance have none.
+independent runs the observed mean square over that is χ²/(ν·n) of ν·n degrees of freedom (ν = 1 of an estimate): the
+interval. A value that is itself a claim ("3σ") is compared by its mean. Tests of significance have none.
 """
 
 import re
