@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from anyio import sleep, to_thread
-from fastapi import APIRouter, Query
+from fastapi import Query
 from fastapi.responses import StreamingResponse
 from pydantic import AwareDatetime, BaseModel, Field
 
@@ -19,10 +19,11 @@ from bench_service.mapping import copied
 from bench_service.model.batches import AnalysisBatch, AnalysisTask, BatchState, Grouping, Selection, TaskState
 from bench_service.model.job import Failure
 from bench_service.model.search import LabelSought, Search
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.limits import Verdict
 
-router = APIRouter(prefix="/api/v1/analyses/batches", tags=["analyses"])
+router = Routes(prefix="/api/v1/analyses/batches", tags=["analyses"])
 LOOK_S = 0.5
 """Interval at which a stream of a batch looks for progress [s]."""
 QUIET_LOOKS = 20

@@ -6,7 +6,7 @@ process's own.
 
 from collections.abc import Iterator
 
-from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi import FastAPI, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram, generate_latest
 from prometheus_client.core import (
     CounterMetricFamily,
@@ -22,11 +22,12 @@ from bench_service.api.http.errors import problems
 from bench_service.bench.live.values import BenchLive
 from bench_service.jobs.events.hub import EventHub
 from bench_service.model.job import FINAL, JobState
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from bench_service.telemetry.tallies import DURATION_S, NEVER_LEFT, Spread, Tallies
 from bench_service.wall_clock import monotonic_s, now
 
-router = APIRouter(tags=["health"])
+router = Routes(tags=["health"])
 
 BENCH_STATES = ("idle", "busy", "stopped", "offline")
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import Response
 from pydantic import Field
 
 from bench_service.api.http.dependencies import IdempotencyKey, Service
@@ -10,11 +10,12 @@ from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import Request
 from bench_service.api.recordings import RecordingView
 from bench_service.evidence.imports import Synthesis
+from bench_service.routing import Routes
 from procedures.core import units
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Channel, Quantity
 
-router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
+router = Routes(prefix="/api/v1/recordings", tags=["recordings"])
 Coefficient = Annotated[float, Field(ge=0.0, le=1e6, allow_inf_nan=False)]
 
 KINDS = {

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from math import inf, sqrt
 from typing import Any
 
+from bench_service.bench.pace import PaceLog
 from procedures.analysis.measured_stations import angle_difference_deg
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.description import TableAccuracy
@@ -61,8 +62,11 @@ class DeviceLog:
     Refuses an axis that is not where it was commanded.
     """
 
-    def __init__(self, bench: Bench, station: Station) -> None:
-        """Set up. Angles are read of a table that stands still and carries the unit: not where a hand sets it."""
+    def __init__(self, bench: Bench, station: Station, start_s: float) -> None:
+        """Set up; `start_s`: bench time of the recording's beginning [s].
+
+        Angles are read of a table that stands still and carries the unit: not where a hand sets it.
+        """
         moved = station.turn is not None or station.sinusoid is not None
         alone = not moved and station.profile is None and station.current_ma is None
         self._commanded = station.angles if alone else None
@@ -73,6 +77,13 @@ class DeviceLog:
         self._limiting = False
         self._room = {name: _Moments(1) for name in ROOM}
         self._status: dict[str, None] = {}
+        wired = any(device.name == "unit_link" and device.address for device in bench.description.devices)
+        self._pace = PaceLog(start_s) if wired else None
+
+    def block(self, samples_s: float) -> None:
+        """A block of the unit has come; `samples_s`: time of all samples so far [s]."""
+        if self._pace is not None:
+            self._pace.block(self._bench.clock.now_s(), samples_s)
 
     async def look(self) -> None:
         """Read the devices if the last reading is old enough.
@@ -104,7 +115,8 @@ class DeviceLog:
             supply = MeasuredSupply(voltage, current, self._power.spread[1], self._limiting, self._power.count)
         means = {name: m.mean[0] for name, m in self._room.items() if m.count}
         room = MeasuredEnvironment(**means) if means else None
-        return Measured(angles, supply, room, tuple(self._status))
+        pace = None if self._pace is None else self._pace.measured()
+        return Measured(angles, supply, room, tuple(self._status), pace)
 
     def _table(self, commanded: TableAngles, reading: TableReading) -> None:
         require_agreement(commanded, reading, self._bench.description.accuracy)

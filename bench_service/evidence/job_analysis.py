@@ -10,6 +10,7 @@ from bench_service.evidence.stores import EvidenceStores
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 from bench_service.wall_clock import new_id, now
+from procedures.analysis.measured_pace import fell_behind
 from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
@@ -49,9 +50,9 @@ def analysed(
         raise UnfitRecording(f"job {job.id} has {len(recordings)} of its {len(job.stations)} recordings")
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = analyse_procedure(procedure, recordings, params, context)
-    overdue = context.bench.overdue(job.created_at.date().isoformat())
-    if overdue:
-        outcome = outcome.model_copy(update={"warnings": (*overdue, *outcome.warnings)})
+    said = (*context.bench.overdue(job.created_at.date().isoformat()), *fell_behind([r.info for r in recordings]))
+    if said:
+        outcome = outcome.model_copy(update={"warnings": (*said, *outcome.warnings)})
     used = (context.unit.calibration_id(triad) for triad in procedure.uses_calibration)
     stored = StoredResult(
         id=new_id(),

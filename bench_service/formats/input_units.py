@@ -76,6 +76,11 @@ def spelled(unit: str) -> str:
     return _SPELLINGS.get(unit, unit)
 
 
+def every_unit() -> set[str]:
+    """Return all units of all quantities, in every spelling."""
+    return {unit for sizes in _SIZES.values() for unit in sizes} | set(_SPELLINGS)
+
+
 def allowed_units(quantity: Quantity) -> tuple[str, ...]:
     """Return the units that a column of a quantity may have; "count" means that its scale is not known yet."""
     return (*_SIZES[quantity], "count")

@@ -122,6 +122,14 @@ class TextSource:
         return taken
 
 
+def text_of(data: bytes) -> str:
+    """Decode some of a text: UTF-8 with or without a mark, or else the code page 1252 of Western Windows."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
 def too_long(name: str, number: int) -> UnreadableFile:
     """Build the refusal of a line without an end."""
     return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is not a table of text")

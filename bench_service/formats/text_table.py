@@ -13,7 +13,7 @@ from typing import BinaryIO
 from bench_service.formats.bounds import COLUMNS, LINE_BYTES, Bounds, listed, not_one_column, quoted
 from bench_service.formats.description import DELIMITERS, Column, ImportDescription
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.text_source import TextSource, too_long
+from bench_service.formats.text_source import TextSource, text_of, too_long
 
 SAMPLE_LINES = 200
 MARKERS = "#%"
@@ -127,6 +127,8 @@ class TextTable:
             names.append("")
         if len(names) == self.width + 1 and not names[-1]:
             names.pop()
+        if len(names) == self.width + 1 and not names[0].strip(MARKERS):
+            names.pop(0)  # the mark of a comment, apart from the names by a blank
         if len(names) == self.width:
             return
         if len(data) < 2 and len(names) > 1:  # a single line is no law
@@ -198,11 +200,7 @@ def _usual_width(rows: Sequence[list[bytes]], preferred: int) -> int:
 
 
 def _name(cell: bytes) -> str:
-    try:
-        text = cell.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = cell.decode("cp1252", errors="replace")
-    return text.strip().strip('"').strip()
+    return text_of(cell).strip().strip('"').strip()
 
 
 def _same(name: str, wanted: str) -> bool:

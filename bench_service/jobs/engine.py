@@ -27,8 +27,6 @@ from bench_service.telemetry.defects import described
 
 PROCEDURE_ABI = "1"
 """Version of the workflows' contract: raise it when this code can no longer continue stored workflows."""
-SHUT_DOWN_S = 20.0
-"""Time that the running job may take to leave the bench safe when the service ends [s]."""
 RETRY_S = 0.5
 """Interval between two attempts to write a bad end that could not be written [s]."""
 LISTEN_S = 0.1
@@ -78,8 +76,13 @@ class Engine:
         bench_id: str,
         runner: JobRunner,
         understood: Callable[[Exception], Exception],
+        ending_s: float,
     ) -> None:
-        """Set up with `understood`: translates errors of the engine's own database into the service's own classes."""
+        """Set up with `understood`: translates errors of the engine's own database into the service's own classes.
+
+        `ending_s`: time that the running job may take to leave the bench safe when the service ends [s].
+        """
+        self._ending_s = ending_s
         self._understood = understood
         self._version = f"{bench_id}:{PROCEDURE_ABI}"
         self._runner = runner
@@ -144,7 +147,7 @@ class Engine:
     def shut_down(self) -> None:
         """Stop working, once the running job has left the bench safe; it resumes after the next start."""
         self._ending.set()
-        if self._one_at_a_time.acquire(timeout=SHUT_DOWN_S):
+        if self._one_at_a_time.acquire(timeout=self._ending_s):
             self._one_at_a_time.release()
         DBOS.destroy(destroy_registry=True)
 

@@ -56,7 +56,6 @@ class ManualLease:
     created_at: datetime
     until: datetime
     """Moment at which the lease ends by itself; renewing moves it."""
-    team: str = ""
     reservation: str | None = None
     began_at: datetime | None = None
     """Moment at which the bench's worker took it; None: not yet."""

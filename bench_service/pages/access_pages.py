@@ -2,12 +2,13 @@
 
 import re
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.pages.rendering import templates
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 _OWN_PATH = re.compile(r"/(?![/\\])[^\x00-\x1f\\]*")
 
 

@@ -2,7 +2,7 @@
 
 from urllib.parse import quote, urlencode
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.campaigns.run import CampaignRun, StepState
@@ -10,9 +10,10 @@ from bench_service.model.job import JobState
 from bench_service.pages.images import SHELF
 from bench_service.pages.rendering import service_of, templates
 from bench_service.pages.trend_chart import TrendQuery, trend_of, wanted_trend
+from bench_service.routing import Routes
 from procedures.core.units import DISPLAY
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 def _explanation(run: CampaignRun) -> str:

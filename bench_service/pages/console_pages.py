@@ -1,11 +1,12 @@
 """Routes of the pages that are made by scripts over the public API: start, queue, search, recordings, accounts."""
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.pages.rendering import service_of, templates
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 def _page(request: Request, name: str, **context: object) -> HTMLResponse:

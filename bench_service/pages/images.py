@@ -8,7 +8,7 @@ import hashlib
 from collections import OrderedDict
 from threading import Lock
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 
 from bench_service.evidence.admission import Turns
 from bench_service.model.errors import NotFound
@@ -16,9 +16,10 @@ from bench_service.pages.caching import kept
 from bench_service.pages.figures import svg
 from bench_service.pages.rendering import service_of
 from bench_service.pages.trend_chart import TrendQuery, trend_of, wanted_trend
+from bench_service.routing import Routes
 from procedures.core.report import Figure, Report
 
-router = APIRouter(include_in_schema=False)
+router = Routes(include_in_schema=False)
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox"
 """Content-Security-Policy of a drawing: it has styles in place; opened alone it runs nothing."""

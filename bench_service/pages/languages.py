@@ -9,13 +9,14 @@ from importlib.resources import files
 from io import BytesIO
 
 import polib
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from fastapi.responses import RedirectResponse
 
 from bench_service.model.errors import NotFound
 from bench_service.pages.caching import kept
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False)
+router = Routes(include_in_schema=False)
 
 LANGUAGES = {"en": "English", "uk": "Українська"}
 COOKIE = "bench_language"

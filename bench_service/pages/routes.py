@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.formats.calibration_exports.forms import CalibrationForm
@@ -12,6 +12,7 @@ from bench_service.model.records import StoredResult
 from bench_service.pages.corrections import correction_table
 from bench_service.pages.images import SHELF
 from bench_service.pages.rendering import service_of, templates
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
@@ -19,7 +20,7 @@ from procedures.core.report import Figure
 from procedures.core.unit import Unit
 from procedures.core.units import DISPLAY, NOISE_DISPLAY
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 SHOWN_EVENTS = 300
 """Number of a job's latest events that its page lists."""

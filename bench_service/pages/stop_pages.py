@@ -4,13 +4,14 @@ from json import JSONDecodeError
 from typing import Annotated, Any
 from urllib.parse import quote
 
-from fastapi import APIRouter, Form, Request
+from fastapi import Form, Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.pages.in_process import ask
 from bench_service.pages.rendering import service_of, templates
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.post("/benches/{bench_id}/stop")

@@ -64,7 +64,6 @@ def test_memory_without_a_slope_is_not_determined_and_no_pass(capsys: pytest.Cap
     assert grown.startswith("memory grows by +1.000 a minute")
     assert [text.split(":")[1] for text in growing(Samples(), 45.0)] == [
         " not determined",
-        " not determined",
         " its growth is not determined",
     ]
     assert "MB by quarter" in capsys.readouterr().out

@@ -145,6 +145,9 @@ def read_bench_file(path: Path) -> BenchFile:
     if rest.operator.driver not in (SIMULATED, "asked"):
         at = place(path, text, ("operator", "driver"))
         raise Misconfigured(f'{at}: operator.driver = {rest.operator.driver!r} must be "asked" or "simulated"')
+    if rest.operator.address is not None and rest.operator.address.scheme != "tcp":
+        at = place(path, text, ("operator", "address"))
+        raise Misconfigured(f"{at}: operator.address = {rest.operator.address}: a served person listens on tcp")
     return file
 
 

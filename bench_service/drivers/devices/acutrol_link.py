@@ -1,4 +1,4 @@
-"""Questions to an ACUTROL controller over its line: states, interlocks, limits, demands, each set read back."""
+"""Requests to an ACUTROL controller over its line: states, interlocks, limits, demands, each set read back."""
 
 from collections.abc import Callable, Sequence
 from typing import Literal, TypeVar
@@ -9,7 +9,7 @@ from bench_service.drivers.answers import Refusal
 from bench_service.drivers.devices.wire import Greeting, Note, accepted, line_times
 from bench_service.drivers.interface.driver import Bound
 from bench_service.drivers.interface.sections import NonNegative, Positive, WireTurntable
-from bench_service.drivers.link.exchange import Ask, Question
+from bench_service.drivers.link.exchange import Ask, Request
 from bench_service.drivers.link.framing import Framing
 from bench_service.drivers.link.line import DeviceLine
 from bench_service.drivers.protocols import acutrol
@@ -62,7 +62,7 @@ class AcutrolLink:
         self._dialect = Dialect(
             section.reply_prefix_bytes, ENDINGS[section.ending], ENDINGS[section.reply_ending], section.acknowledgement
         )
-        identity = self._question(acutrol.IDENTITY_QUERY, "its identity", self._identity)
+        identity = self._request(acutrol.IDENTITY_QUERY, "its identity", self._identity)
         self._greeting = Greeting("turntable", identity, self._first_words, note)
         framing = Framing(self._dialect.reply_ending, section.reply_prefix_bytes)
         self._line = DeviceLine(
@@ -148,10 +148,10 @@ class AcutrolLink:
         self._line.close()
 
     async def _set(self, statement: str) -> None:
-        question = self._question(
+        request = self._request(
             statement, statement, lambda answer: acutrol.acknowledged(self._dialect, answer), demand=True
         )
-        await accepted(self._line.ask(question), "turntable", statement)
+        await accepted(self._line.ask(request), "turntable", statement)
 
     async def _number(self, query: str) -> float:
         return (await self._ask(query, lambda a: acutrol.numbers(self._dialect, a, 1)))[0]
@@ -160,11 +160,11 @@ class AcutrolLink:
         return await self._ask(query, lambda a: acutrol.word(self._dialect, a))
 
     async def _ask(self, query: str, read: Callable[[bytes], T]) -> T:
-        return await accepted(self._line.ask(self._question(query, query, read)), "turntable", query)
+        return await accepted(self._line.ask(self._request(query, query, read)), "turntable", query)
 
-    def _question(self, statement: str, name: str, read: Callable[[bytes], T], demand: bool = False) -> Question[T]:
+    def _request(self, statement: str, name: str, read: Callable[[bytes], T], demand: bool = False) -> Request[T]:
         answered = not demand or bool(self._dialect.acknowledgement)
-        return Question(acutrol.line(self._dialect, statement), name, read, demand, answered)
+        return Request(acutrol.line(self._dialect, statement), name, read, demand, answered)
 
     def _same(self, name: str, demanded: float, found: float) -> None:
         if abs(found - demanded) > SENT_BACK:
@@ -176,12 +176,12 @@ class AcutrolLink:
     def _first_words(self, ask: Ask) -> None:
         """Status and factory limits, at each new line."""
         query = acutrol.STATUS_QUERY
-        ask(self._question(query, query, lambda a: acutrol.status_byte(self._dialect, a)))
+        ask(self._request(query, query, lambda a: acutrol.status_byte(self._dialect, a)))
         found: list[Bound] = []
         for name, axis in zip(("outer", "middle", "inner"), self.axes, strict=True):
             query = acutrol.absolute_limits_query(axis)
             try:
-                own = ask(self._question(query, query, lambda a: acutrol.absolute_limits(self._dialect, a)))
+                own = ask(self._request(query, query, lambda a: acutrol.absolute_limits(self._dialect, a)))
             except Refusal:
                 continue
             found += [

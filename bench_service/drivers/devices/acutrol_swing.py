@@ -38,7 +38,7 @@ class SwingingTable(WatchedTable):
         self._traced = NO_TRACE
 
     def trace(self) -> EncoderTrace:
-        """Take the readings of a sinusoid; see the port. Each is timed by the middle of its question."""
+        """Take the readings of a sinusoid; see the port. Each is timed by the middle of its request."""
         taken, self._traced = self._traced, NO_TRACE
         return taken
 
@@ -96,7 +96,7 @@ class SwingingTable(WatchedTable):
                 raise DeviceFault(f"the {sinusoid.axis} axis swung by {largest:.4g} deg where {wanted} were demanded")
 
     async def _reading(self, index: int) -> AxisState:
-        """Read the axes, and keep the reading with the interval of its question."""
+        """Read the axes, and keep the reading with the interval of its request."""
         asked_s = self._clock.now_s()
         states = await self._states()
         heard_s = self._clock.now_s()

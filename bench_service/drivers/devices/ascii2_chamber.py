@@ -12,7 +12,7 @@ from bench_service.drivers.devices.chamber_rules import (
 from bench_service.drivers.devices.wire import Greeting, line_times
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import NonNegative, WireChamber
-from bench_service.drivers.link.exchange import Ask, Question
+from bench_service.drivers.link.exchange import Ask, Request
 from bench_service.drivers.link.framing import Framing
 from bench_service.drivers.link.line import DeviceLine
 from bench_service.drivers.protocols import ascii2
@@ -64,8 +64,8 @@ class Ascii2Chamber:
 
     def __init__(self, section: Ascii2Section, context: DriverContext) -> None:
         self._section, self._clock, self._layout = section, context.clock, section.layout
-        self._state = Question(ascii2.read_request(self._layout), "its state", lambda a: ascii2.state(self._layout, a))
-        identity = Question(self._state.data, "its state", lambda a: _identity(ascii2.state(self._layout, a)))
+        self._state = Request(ascii2.read_request(self._layout), "its state", lambda a: ascii2.state(self._layout, a))
+        identity = Request(self._state.data, "its state", lambda a: _identity(ascii2.state(self._layout, a)))
         self._greeting = Greeting("chamber", identity, self._first_words, context.note)
         self._line = DeviceLine(
             "chamber", section.address, Framing(ascii2.ENDING), self._greeting, line_times(section, section.after_set_s)
@@ -130,7 +130,7 @@ class Ascii2Chamber:
         if self._section.gradients:
             data = ascii2.gradient_request(self._layout, ramp_c_min, ramp_c_min)
             name = f"ramps of {ramp_c_min:g} K/min"
-            await self._line.ask(Question(data, name, ascii2.acknowledged, demand=True))
+            await self._line.ask(Request(data, name, ascii2.acknowledged, demand=True))
         elif ramp_c_min < self.limits.ramp_c_min:
             raise DeviceFault(
                 f"ramp_c_min = {ramp_c_min:g}: this chamber takes no ramp (gradients = false), only its own, "
@@ -146,7 +146,7 @@ class Ascii2Chamber:
 
     async def _write(self, points: list[float] | tuple[float, ...], switches: str, name: str) -> State:
         data = ascii2.write_request(self._layout, points, switches)
-        await self._line.ask(Question(data, name, ascii2.acknowledged, demand=True))
+        await self._line.ask(Request(data, name, ascii2.acknowledged, demand=True))
         found = await self._line.ask(self._state)
         if found.digital[: self._layout.digital] != switches[: self._layout.digital]:
             raise DeviceFault(f"the chamber was given {name} and its switches read back as {found.digital}")

@@ -9,7 +9,7 @@ from bench_service.drivers.answers import Refusal
 from bench_service.drivers.devices.wire import Greeting, accepted, line_times
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import Positive, WireSupply
-from bench_service.drivers.link.exchange import Ask, Question
+from bench_service.drivers.link.exchange import Ask, Request
 from bench_service.drivers.link.framing import Framing
 from bench_service.drivers.link.line import DeviceLine
 from bench_service.drivers.protocols import scpi
@@ -42,7 +42,7 @@ class ScpiSupply:
     def __init__(self, section: ScpiSection, context: DriverContext) -> None:
         self._section, self._clock = section, context.clock
         self._dialect = scpi.Dialect(section.channel, section.trip_query, section.mode_query)
-        identity = Question(scpi.line(self._dialect, scpi.IDENTITY_QUERY), "its identity", _identity)
+        identity = Request(scpi.line(self._dialect, scpi.IDENTITY_QUERY), "its identity", _identity)
         self._greeting = Greeting("supply", identity, self._empty_errors, context.note)
         self._line = DeviceLine(
             "supply", section.address, Framing(self._dialect.ending), self._greeting, line_times(section)
@@ -125,19 +125,19 @@ class ScpiSupply:
 
     async def _query(self, words: str, read: Callable[[bytes], T]) -> T:
         data = scpi.line(self._dialect, scpi.header(self._dialect, words))
-        return await accepted(self._line.ask(Question(data, words, read)), "supply", words)
+        return await accepted(self._line.ask(Request(data, words, read)), "supply", words)
 
     async def _set(self, statement: str, name: str) -> None:
         """Send a set and the query of its error in one piece, so that they share a line; neither is sent twice."""
         data = scpi.line(self._dialect, statement) + scpi.line(self._dialect, scpi.ERROR_QUERY)
-        question = Question(data, name, scpi.no_error, demand=True)
-        await accepted(self._line.ask(question), "supply", name)
+        request = Request(data, name, scpi.no_error, demand=True)
+        await accepted(self._line.ask(request), "supply", name)
 
     def _empty_errors(self, ask: Ask) -> None:
         """Read old errors away at a new line, so that none is taken for that of a later set."""
-        question = Question(scpi.line(self._dialect, scpi.ERROR_QUERY), "its old errors", scpi.error)
+        request = Request(scpi.line(self._dialect, scpi.ERROR_QUERY), "its old errors", scpi.error)
         for _ in range(MOST_ERRORS):
-            if ask(question)[0] == 0:
+            if ask(request)[0] == 0:
                 return
         raise Refusal(f"its error queue does not come to an end within {MOST_ERRORS} errors")
 

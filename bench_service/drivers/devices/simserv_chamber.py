@@ -15,7 +15,7 @@ from bench_service.drivers.devices.chamber_rules import (
 from bench_service.drivers.devices.wire import Greeting, accepted, line_times
 from bench_service.drivers.interface.driver import Bound, DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import NonNegative, Positive, WireChamber
-from bench_service.drivers.link.exchange import Ask, Question
+from bench_service.drivers.link.exchange import Ask, Request
 from bench_service.drivers.link.framing import Framing
 from bench_service.drivers.link.line import DeviceLine
 from bench_service.drivers.protocols import simserv
@@ -51,10 +51,10 @@ class SimservChamber:
         self._variable = str(section.variable)
         self._own: tuple[Bound, ...] = ()
         self._door: int | None = None
-        self._first = Question(
+        self._first = Request(
             simserv.request(Command.INFORMATION, [str(Information.TYPE.value)]), "its type", simserv.text_of
         )
-        identity = Question(self._first.data, "its type", lambda answer: DeviceIdentity(model=simserv.text_of(answer)))
+        identity = Request(self._first.data, "its type", lambda answer: DeviceIdentity(model=simserv.text_of(answer)))
         self._greeting = Greeting("chamber", identity, self._first_words, context.note)
         self._line = DeviceLine(
             "chamber",
@@ -156,21 +156,19 @@ class SimservChamber:
 
     async def _ask(self, command: Command, arguments: list[str], read: Callable[[bytes], T]) -> T:
         name = f"{command.name.lower().replace('_', ' ')} ({command.value})"
-        return await accepted(
-            self._line.ask(Question(simserv.request(command, arguments), name, read)), "chamber", name
-        )
+        return await accepted(self._line.ask(Request(simserv.request(command, arguments), name, read)), "chamber", name)
 
     async def _set(self, command: Command, arguments: list[str], name: str) -> None:
-        question = Question(simserv.request(command, arguments), name, simserv.accepted, demand=True)
-        await accepted(self._line.ask(question), "chamber", name)
+        request = Request(simserv.request(command, arguments), name, simserv.accepted, demand=True)
+        await accepted(self._line.ask(request), "chamber", name)
 
     def _first_words(self, ask: Ask) -> None:
         """Status, own limits and the place of the door, at each new line."""
 
         def put(command: Command, *arguments: str) -> float:
-            return ask(Question(simserv.request(command, arguments), command.name.lower(), simserv.number_of))
+            return ask(Request(simserv.request(command, arguments), command.name.lower(), simserv.number_of))
 
-        ask(Question(simserv.request(Command.STATUS), "its status", simserv.status_of))
+        ask(Request(simserv.request(Command.STATUS), "its status", simserv.status_of))
         self._own = (
             Bound("limits.minimum_c", put(Command.INPUT_MINIMUM, self._variable)),
             Bound("limits.maximum_c", put(Command.INPUT_MAXIMUM, self._variable)),
@@ -179,7 +177,7 @@ class SimservChamber:
         if self._section.door_input:
             for index in range(1, min(MOST_INPUTS, int(put(Command.DIGITAL_INPUT_COUNT))) + 1):
                 request = simserv.request(Command.DIGITAL_INPUT_NAME, [str(index)])
-                if ask(Question(request, "an input's name", simserv.text_of)) == self._section.door_input:
+                if ask(Request(request, "an input's name", simserv.text_of)) == self._section.door_input:
                     self._door = index
 
 

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from bench_service.drivers.answers import Refusal
 from bench_service.drivers.interface.sections import Wire
-from bench_service.drivers.link.exchange import Ask, LineTimes, Question
+from bench_service.drivers.link.exchange import Ask, LineTimes, Request
 from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import DeviceFault
 
@@ -19,7 +19,7 @@ class Greeting:
     def __init__(
         self,
         device: str,
-        identity: Question[DeviceIdentity],
+        identity: Request[DeviceIdentity],
         status: Callable[[Ask], None],
         note: Note,
     ) -> None:

@@ -51,6 +51,8 @@ class DriverContext:
     """Writes an event into the devices' journal, such as ("turntable.status", {"word": …}): for links lost and made,
     status words that changed, frames that were lost. Waits for nothing.
     """
+    time_factor: float = 1.0
+    """Bench seconds in a real second: other than 1 for served simulators alone, whose data come faster by as much."""
 
 
 @dataclass(frozen=True)

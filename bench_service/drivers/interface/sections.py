@@ -214,6 +214,11 @@ class WireCurrentSource(CurrentSourceSection, Wire):
 class OperatorSection(DeviceSection):
     """Section ``[operator]``: "simulated", or "asked" for a person who is asked by a prompt."""
 
+    address: AddressText | None = None
+    """Address of the person of served simulators (`bench simulate`), who sets the simulated unit by hand: at once with
+    "simulated", after the person who is asked with "asked". None: no simulator is served, or none is set by hand.
+    """
+
 
 class EnvironmentSection(DeviceSection):
     """Section ``[environment]``: conditions of the room, entered (`driver = "entered"`) or read by a driver."""

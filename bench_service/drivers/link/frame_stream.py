@@ -79,6 +79,8 @@ class FrameStream:
         """Number of frames that have come over all lines."""
         self.last_frame_s = 0.0
         """Moment of the newest frame on the monotonic clock [s]; 0 before the first one."""
+        self.last_valid_s = 0.0
+        """Moment of the newest frames of which the last one is valid [s]; 0 before the first ones."""
         self._newest: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
 
     @property
@@ -168,7 +170,10 @@ class FrameStream:
             self._note("imu.frames_lost", {"why": why})
             self._fail(Disconnected(f"{self.named}: {why}"), begun_only=gap.at == 0)
         self._spoiled = 0
-        invalid = np.flatnonzero(decoder.invalid(decoded.status))
+        mask = decoder.invalid(decoded.status)
+        if not mask[-1]:
+            self.last_valid_s = self.last_frame_s
+        invalid = np.flatnonzero(mask)
         if len(invalid):
             at = int(invalid[0])
             words = ", ".join(f"{name} {raw}" for name, raw, _ in decoder.words(decoded.status[at]))

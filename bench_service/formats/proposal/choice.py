@@ -10,12 +10,16 @@ MOST_CHANNELS = 16
 
 
 def chosen_table(tables: Sequence[LogTable]) -> LogTable:
-    """Choose the table with the most axes; of equal ones that with a clock, of higher rank, the longest."""
-    return max(tables, key=lambda t: (_axes(t), bool(t.clocks), t.rank, t.rows or 0))
+    """Choose the table with the most axes; of equal ones by doubts, clock, rank, length."""
+    return max(tables, key=lambda t: (_axes(t), -_doubts(t), bool(t.clocks), t.rank, t.rows or 0))
 
 
 def _axes(table: LogTable) -> int:
     return len({column.channel for column in table.columns} & set(ORDER))
+
+
+def _doubts(table: LogTable) -> int:
+    return len({column.channel for column in table.columns if column.doubt} & set(ORDER))
 
 
 def chosen_columns(table: LogTable) -> tuple[list[LogColumn], list[str]]:

@@ -31,6 +31,8 @@ class Values:
     squares: Array = field(default_factory=lambda: np.zeros(0))
     finite: Array = field(default_factory=lambda: np.zeros(0))
     largest: Array = field(default_factory=lambda: np.zeros(0))
+    whole: Array = field(default_factory=lambda: np.zeros(0))
+    """1 where all finite values of a channel are whole numbers."""
     shift: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, block: Array) -> None:
@@ -39,12 +41,14 @@ class Values:
             width = block.shape[1]
             self.shift = np.where(np.isfinite(block[0]), block[0], 0.0)
             self.sums, self.squares, self.finite, self.largest = (np.zeros(width) for _ in range(4))
+            self.whole = np.ones(width)
         good = np.isfinite(block)
         moved = np.where(good, block - self.shift, 0.0)
         self.sums += moved.sum(axis=0)
         self.squares += (moved**2).sum(axis=0)
         self.finite += good.sum(axis=0)
         self.largest = np.maximum(self.largest, np.where(good, np.abs(block), 0.0).max(axis=0))
+        self.whole *= np.all(~good | (block == np.rint(block)), axis=0)
         self.rows += len(block)
 
     @property
@@ -79,7 +83,8 @@ def inspected(
     `unit`: unit of time that its name gives; empty: it gives none.
     """
     asks: list[str] = []
-    plain = {**fields, "unit": "U", "channels": [channel], "time_column": clock.column}
+    column = int(clock.column) if fields.get("header") is False else clock.column
+    plain = {**fields, "unit": "U", "channels": [channel], "time_column": column}
     if clock.unit_s is not None:
         unit = next((u for u, s in {**SECONDS, "100us": 1e-4}.items() if s == clock.unit_s), "s")
     elif not unit:
@@ -88,12 +93,12 @@ def inspected(
             asks.append(
                 f"the unit of time of {clock.column!r} is taken as {unit} by its steps: other units fit as well"
             )
-    own = {"time_column": clock.column} | ({} if unit == "s" else {"time_unit": unit})
+    own = {"time_column": column} | ({} if unit == "s" else {"time_unit": unit})
     found, problem, needed = _judged(opened, {**plain, **own})
     judged = found.clock if found is not None else None
     document: dict[str, Any] = {} if judged is None else judged.document
     view = InspectedClock(
-        column=clock.column,
+        column=column,
         meaning=clock.meaning,
         time_unit=unit,
         rate_hz=None if judged is None else judged.rate_hz,

@@ -1,5 +1,6 @@
 """Delimited text, Parquet and Arrow as tables of the shape that logs have, with what dialects are known to mean."""
 
+from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 import pyarrow as pa
@@ -7,10 +8,22 @@ import pyarrow.parquet as pq
 
 from bench_service.formats.columnar import is_columnar
 from bench_service.formats.errors import UnreadableFile
+from bench_service.formats.logs.dialects import guessed, in_dialect
 from bench_service.formats.logs.names import is_time, time_unit
 from bench_service.formats.logs.table import LogClock, LogColumn, LogTable
-from bench_service.formats.proposal.dialects import Table, guessed, in_dialect
 from bench_service.formats.text_look import TextLook, look
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table, the name of its format, and the fields that its description needs."""
+
+    format: str
+    title: str
+    table: LogTable
+    fields: dict[str, Any] = field(default_factory=dict[str, Any])
+    time_units: dict[str, str] = field(default_factory=dict[str, str])
+    """Unit of a time column where the format or the name says it."""
 
 
 def table_of(stream: BinaryIO, name: str) -> Table:
@@ -54,6 +67,7 @@ def _text(found: TextLook, name: str) -> Table:
         fields["decimal"] = found.decimal
     if found.header_lines:
         fields["header_lines"] = found.header_lines
-    if found.names is None:
+    if found.names is None or found.units is not None:
         fields["header"] = False
-    return in_dialect(found, name, fields)
+    text = in_dialect(found, name)
+    return Table(text.format, text.title, text.table, fields, text.time_units)

@@ -32,7 +32,9 @@ def with_units(
         if not places:
             continue
         quantity = found[places[0]].quantity
-        if quantity is Quantity.SPECIFIC_FORCE:
+        if counts := _counts(found, places, values):
+            unit, sure, why = "count", False, counts
+        elif quantity is Quantity.SPECIFIC_FORCE:
             unit, sure, why = _force_unit(found, places, values)
         elif quantity is Quantity.VELOCITY_INCREMENT:
             unit, sure, why = "m/s", False, "increments"
@@ -52,6 +54,16 @@ def with_units(
             found[i] = replace(column, unit="degC", source=f"{column.source}, the unit a guess")
             asks.append(f"the unit of {column.name} is not said; taken as degC")
     return found, asks, notes
+
+
+def _counts(columns: Sequence[LogColumn], places: Sequence[int], values: Values) -> str:
+    """Say why columns are taken for counts: whole numbers whose unit gravity does not tell; empty: they are not."""
+    whole = all(values.whole[i] and columns[i].scale == 1.0 for i in places)
+    if not whole or not any(values.largest[i] > 1.0 for i in places):
+        return ""
+    if columns[places[0]].quantity is Quantity.SPECIFIC_FORCE and _force_unit(columns, places, values)[1]:
+        return ""
+    return "whole numbers, as a converter gives them; give unit and scale, or leave the counts to a calibration"
 
 
 def _force_unit(columns: Sequence[LogColumn], places: Sequence[int], values: Values) -> tuple[str, bool, str]:

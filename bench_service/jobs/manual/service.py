@@ -32,7 +32,6 @@ class ManualRequest:
     reason: str
     minutes: float
     reservation: str | None
-    team: str
 
 
 class ManualService:

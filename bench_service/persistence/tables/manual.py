@@ -32,7 +32,6 @@ class ManualLeaseRow(Table):
     reason: Mapped[str]
     created_at: Mapped[datetime]
     until: Mapped[datetime]
-    team: Mapped[str]
     reservation: Mapped[str | None] = mapped_column(Id)
     began_at: Mapped[datetime | None]
     process: Mapped[str]

@@ -5,9 +5,10 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from bench_service.formats.bounds import MEGABYTE, quoted
+from bench_service.formats.bounds import MEGABYTE
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.logs.names import hint, is_time, unit_of
+from bench_service.formats.logs.arrays_by_name.tables import with_unit
+from bench_service.formats.logs.names import hint, is_time
 from bench_service.formats.logs.optional import needed
 from bench_service.formats.logs.table import LogClock, LogColumn, LogTable, Numbers
 
@@ -133,9 +134,9 @@ def _column(name: str, channel: Any) -> LogColumn:
     said = str(channel.properties.get("unit_string", ""))
     if guess.quantity is None:
         return LogColumn(name)
-    unit = unit_of(said, guess.quantity) if said else None
-    source = f"unit_string of the channel, {quoted(said)}" if unit else "the name of the channel"
-    return LogColumn(name, guess.quantity, unit or guess.unit, channel=guess.channel, source=source, doubt=guess.doubt)
+    return with_unit(
+        LogColumn(name, guess.quantity, guess.unit, channel=guess.channel, doubt=guess.doubt), said, "channel"
+    )
 
 
 def _words(error: Exception) -> str:
