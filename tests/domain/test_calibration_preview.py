@@ -90,6 +90,8 @@ def test_the_bias_in_run_of_a_calibration_is_foreseen_in_sample(context: Context
     planned = {c.check: c for c in CALIBRATION.planned_checks(params, context)}[f"{triad} bias in run, δ/√3"]
     dice, draws = np.random.default_rng(6), 120
     squares = np.array([in_run(plan, dice) for _ in range(draws)]) ** 2
+    assert planned.standard_uncertainty is not None
+    assert planned.degrees_of_freedom is not None
     foreseen = planned.standard_uncertainty * units.DISPLAY[{"gyro": "rad/s", "accelerometer": "m/s^2"}[triad]][1]
     assert abs(squares.mean() / foreseen**2 - 1.0) < 4.5 * np.sqrt(2.0 / (draws * planned.degrees_of_freedom))
 
@@ -97,6 +99,7 @@ def test_the_bias_in_run_of_a_calibration_is_foreseen_in_sample(context: Context
 def in_run(plan: TriadPlan, dice: np.random.Generator) -> float:
     """δ/√3 of one calibration whose noise and table are drawn from the plan's, with K the identity and no bias."""
     noise = plan.noise_covariance()
+    assert noise is not None
     turned = plan.vectors + plan.table.sensitivity @ (plan.table.sd * dice.normal(size=len(plan.table.sd)))
     drawn = np.array([np.linalg.cholesky(c) @ dice.normal(size=len(turned)) for c in noise]).T
     unit = {"gyro": "rad/s", "accelerometer": "m/s^2"}[plan.triad]
