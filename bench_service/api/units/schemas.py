@@ -112,7 +112,7 @@ class CorrectionChoice(Request):
 class CorrectionRuleChoice(CorrectionChoice):
     """Request to give a kind of correction back to the rule."""
 
-    kind: CorrectionKind
+    kind: CorrectionKind = Field(description="Kind whose newest usable correction by a job that passed is to count")
 
 
 class CorrectionPage(BaseModel):
