@@ -36,7 +36,9 @@ def driving(
     files: BenchFiles,
     closing: ExitStack,
 ) -> tuple[Worker, LiveBoard]:
-    """Compose the worker of this process's bench, with its lease, heartbeat and stop guard. Raises `BenchBusy`."""
+    """Return the worker and the live state of this process's bench, after its lease was taken and its heartbeat and
+    stop guard were set up. Raises `BenchBusy`.
+    """
     lease = acquire_lease(settings.database_url, settings.bench_id)
     closing.callback(lease.release)
     files.begin_driving()

@@ -43,7 +43,7 @@ class Result(Outcome):
 def calibrated(
     recordings: Sequence[Recording], site: Site, table: TableUncertainty, unit: Unit | None, limits: FerrarisLimits
 ) -> Result:
-    """Both triads. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    """Return the calibration of both triads, with checks. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
     gyro = analyse_ferraris(recordings, site, table, unit.gyro if unit else None)
     at_rest = analyse_means(rest_means(recordings), site, table, unit.accelerometer if unit else None)
     (force,) = suspected([at_rest])
@@ -58,12 +58,12 @@ def calibrated(
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """Calibrations of both triads."""
+    """Return the calibrations of both triads in a result."""
     return result.gyro.calibration, result.accelerometer.calibration
 
 
 def report(result: Result) -> Report:
-    """Coefficients of both triads, budgets, residuals and magnitudes."""
+    """Return the report: coefficients of both triads, budgets, residuals and magnitudes."""
     note = "U = b + K·ω: b from the rests and the sums of turns there and back, K from their differences."
     force = result.accelerometer
     tables = (

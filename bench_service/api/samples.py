@@ -1,4 +1,4 @@
-"""Routes of samples as people's tools read them: of one recording, and of a whole job as one zip."""
+"""Routes that export samples for other tools: those of one recording, and those of a whole job as one zip."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -42,7 +42,7 @@ ZIP: dict[int | str, dict[str, object]] = {
 
 
 class Values(StrEnum):
-    """Values of samples: in SI, or as they are stored."""
+    """Kind of exported values: in SI units, or raw as they are stored."""
 
     PHYSICAL = "physical"
     RAW = "raw"

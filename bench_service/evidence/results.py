@@ -1,6 +1,6 @@
-"""PORT of memory for results, the calibrations and corrections that come with them, and lineage.
+"""Interface of the store of results, the calibrations and corrections that come with them, and lineage.
 
-Every method is one transaction, as in `store`.
+Every method is one transaction.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from procedures.core.unit_correction import UnitCorrection
 
 
 class ResultStore(Protocol):
-    """The stored results of analyses."""
+    """Store of results of analyses with their lineage. Interface; the SQL is in `persistence`."""
 
     def add(
         self,
@@ -41,7 +41,7 @@ class ResultStore(Protocol):
         ...
 
     def of_content(self, content: str) -> StoredResult | None:
-        """The stored result of a content, see `add`; None where there is none."""
+        """Return the stored result of a content digest, see `add`; None where there is none."""
         ...
 
     def list(
@@ -56,7 +56,9 @@ class ResultStore(Protocol):
     ) -> Page[StoredResult]: ...
 
     def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
-        """The newest result of the procedure that gave a job of the unit its verdict; no second analysis."""
+        """Return the newest result of the procedure that gave a job of the unit its verdict, no second analysis; None
+        where there is none.
+        """
         ...
 
     def values(
@@ -77,5 +79,5 @@ class ResultStore(Protocol):
         ...
 
     def of_recording(self, recording_id: str) -> tuple[str, ...]:
-        """Ids of the results that used a recording."""
+        """Return the ids of the results that used a recording."""
         ...

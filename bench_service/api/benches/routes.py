@@ -36,7 +36,7 @@ router = Routes(prefix="/api/v1/benches", tags=["benches"])
 
 
 def view_of(service: BenchService, bench_id: str) -> BenchView:
-    """Build the view of a bench: what it is, what it does, how safe it is. Raises `NotFound`."""
+    """Return the view of a bench: description, live state, safety, running job, queue. Raises `NotFound`."""
     description = service.benches.description(bench_id)
     running = service.jobs.driving_job(bench_id)
     live = service.live.of_bench(bench_id)

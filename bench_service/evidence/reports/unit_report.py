@@ -17,7 +17,7 @@ RESULTS = 20
 
 
 def unit_report(stores: EvidenceStores, serial: str) -> PrintedDocument:
-    """The report of a unit as it is known now. Raises `NotFound`."""
+    """Return the printed report of a unit as it is known now. Raises `NotFound`."""
     unit = stores.units.unit(serial)
     history = stores.calibrations.list(serial, limit=200).items
     results = stores.results.list(unit=serial, limit=RESULTS).items

@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 class ManualRunner:
-    """Runs one lease at a time."""
+    """Runs leases of manual mode on the bench of this process, one at a time; the dispatcher calls it."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ class ManualRunner:
         return True
 
     def wake(self) -> None:
-        """Look at the lease now: a demand came, or its end was asked for."""
+        """Have the lease read now, because a demand came or its end was requested; never waits."""
         self._wake.set()
 
     def stop_now(self) -> None:

@@ -29,7 +29,7 @@ CORRECTION = TypeAdapter(UnitCorrection)
 def correction_of_row(
     row: CorrectionRow, verdict: str, of_job: bool, decisions: Sequence[CorrectionDecisionRow] = ()
 ) -> StoredCorrection:
-    """Convert a row with its result's verdict and its decisions, oldest first, to its correction."""
+    """Convert a row with its result's verdict and its decisions, oldest first, to a stored correction."""
     return copied(
         StoredCorrection,
         row,
@@ -45,7 +45,7 @@ def correction_of_row(
 def corrections_where(
     session: Session, *conditions: ColumnElement[bool] | InstrumentedAttribute[bool]
 ) -> list[StoredCorrection]:
-    """Corrections under some conditions with their decisions, oldest first."""
+    """Return the corrections that meet all conditions, with their decisions, oldest first."""
     rows = session.scalars(select(CorrectionRow).where(*conditions).order_by(CorrectionRow.id)).all()
     decisions: dict[str, list[CorrectionDecisionRow]] = defaultdict(list)
     if rows:
@@ -73,7 +73,7 @@ def check_corrections(session: Session, result: StoredResult) -> None:
 
 
 def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
-    """Build the rows that link a result to the corrections that it used."""
+    """Return new rows that link a result to the corrections that it used."""
     return [
         ResultCorrectionRow(result_id=result.id, position=position, correction_id=correction_id)
         for position, correction_id in enumerate(result.corrections)
@@ -81,7 +81,7 @@ def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
 
 
 def retire_current(session: Session, unit: str | None, kind: str) -> None:
-    """Unset the unit's current correction of that kind."""
+    """Make the unit's current correction of that kind no longer current, in this transaction."""
     session.execute(
         update(CorrectionRow)
         .where(CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current)
