@@ -110,7 +110,8 @@ def correction_table(corrections: list[dict[str, Any]]) -> Table:
     for column in ("correction", "kind", "made", "result", "verdict", "current", "approval", "valid until"):
         table.add_column(column, overflow="fold")
     for one in corrections:
-        current = ("current, not usable" if one["unusable"] else "current") if one["current"] else ""
+        chosen = ("by rule" if one["by_rule"] else "chosen") if one["current"] else ""
+        current = f"{chosen}, not usable" if chosen and one["unusable"] else chosen
         until = one["valid_until"] or "–"
         cells = (one["made_at"][:19], one["result"], one["verdict"], current, one["approval"], until[:19])
         table.add_row(one["id"], one["kind"], *cells)
