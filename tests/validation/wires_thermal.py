@@ -99,11 +99,8 @@ def over_wires(factor: float, seed: int, rate_hz: float) -> tuple[Cycle, BenchDe
         served(LANGUAGES, thermal=True, factor=factor, world=world) as behind,
     ):
         folder = Path(name)
-        settings = Settings(
-            database_url=f"sqlite:///{folder / 'b.sqlite'}",
-            bench_file=bench_file(folder, behind, factor, after_demand_s=0.02),
-            bench_id="east",
-        )
+        file = bench_file(folder, behind, factor, after_demand_s=0.02)
+        settings = Settings(database_url=f"sqlite:///{folder / 'b.sqlite'}", bench_file=file, bench_id="east")
         driver = driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]
         bench, before_s = driver.open("GL017", None, None, BenchNeeds(temperatures=True)), behind.bench.pace.behind_s
         try:
@@ -153,12 +150,13 @@ def compared(wired: Cycle, inside: Cycle, console: Console) -> list[str]:
     number = len(a.axes) + len(a.gyros)
     for axis, one, other in zip("xyz", a.axes, b.axes, strict=True):
         square, freedom = _square(one.correction, other.correction)
-        words = (f"{c.alpha[3] * 1e6:.2f} ppm/°C, {c.beta[2] * 1e6:.1f} µm/s²/°C" for c in (_c(one), _c(other)))
-        judged(f"correction {axis}: χ² of {freedom}", *words, square, float(chi2.isf(CHANCE / number, freedom)))
+        first, second = (_words(fit.correction) for fit in (one, other))
+        most = float(chi2.isf(CHANCE / number, freedom))
+        judged(f"correction {axis}: χ² of {freedom}", first, second, square, most)
     for one, other in zip(a.gyros, b.gyros, strict=True):
         z = abs(one.slope_rad_s_c - other.slope_rad_s_c) / np.hypot(one.slope_sd_rad_s_c, other.slope_sd_rad_s_c)
-        words = (f"{g.slope_rad_s_c:.2e} rad/s/°C" for g in (one, other))
-        judged(f"gyro {one.axis} slope: z", *words, float(z), float(norm.isf(CHANCE / number / 2.0)))
+        first, second = (f"{g.slope_rad_s_c:.2e} rad/s/°C" for g in (one, other))
+        judged(f"gyro {one.axis} slope: z", first, second, float(z), float(norm.isf(CHANCE / number / 2.0)))
     for k, axis in enumerate("xyz"):
         worst = [1e6 * max(s.after_m_s2[k] for s in c.soaks) for c in (a, b)]
         table.add_row(f"worst 3σ of a soak, {axis} [µm/s²]", *(f"{w:.0f}" for w in worst), "", "")
@@ -187,8 +185,8 @@ def same_counts(wired: Cycle, inside: Cycle, console: Console) -> list[str]:
     return wrong
 
 
-def _c(axis: Any) -> Any:
-    return axis.correction
+def _words(correction: Any) -> str:
+    return f"{correction.alpha[3] * 1e6:.2f} ppm/°C, {correction.beta[2] * 1e6:.1f} µm/s²/°C"
 
 
 def _square(one: Any, other: Any) -> tuple[float, int]:
