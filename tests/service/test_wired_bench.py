@@ -323,9 +323,15 @@ def test_identities_are_in_the_description_and_another_device_refuses_the_job(ea
         driver.open("SIM-0001", 3, None, BenchNeeds(), "job-2")
 
 
-def test_the_devices_own_limits_narrow_the_description(east: East) -> None:
+def test_the_devices_own_limits_narrow_the_description_and_are_logged_once(
+    east: East, caplog: pytest.LogCaptureFixture
+) -> None:
     east.table.state["limits"] = {"outer.rate_deg_s": 30.0}
-    assert east.driver().description.outer.rate_deg_s == 30.0
+    driver = east.driver()
+    assert driver.description.outer.rate_deg_s == 30.0
+    for _ in range(2):
+        driver.open("SIM-0001", 3, None, BenchNeeds(), "job-2").close()
+    assert caplog.text.count("turntable.outer.rate_deg_s: the file has 60, the device 30; 30 holds") == 1
 
 
 def test_a_simulated_unit_stands_in_the_real_chambers_air(east: East) -> None:

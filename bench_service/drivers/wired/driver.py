@@ -75,6 +75,7 @@ class BenchFileDriver:
         self._asking = asking
         self._units = read_units(file.folder / "units")
         self._found: dict[Kind, Found] = {}
+        self._told: set[str] = set()
         self._devices = WiredDevices(lambda: file, register)
         self._description = described(file, simulated.description)
         for kind, failure in self._look().items():
@@ -138,7 +139,9 @@ class BenchFileDriver:
         found = survey(self._file)
         self._found |= found.found
         for sentence in found.limits_said(self._file):
-            log.warning("bench %s: %s", self._file.id, sentence)
+            if sentence not in self._told:  # it is asked before each job, and differs but rarely
+                log.warning("bench %s: %s", self._file.id, sentence)
+            self._told.add(sentence)
         self._description = described(self._file, self._simulated.description, self._found)
         return found.failures
 
