@@ -44,7 +44,7 @@ def _is_matlab_4(start: bytes) -> bool:
 
 
 def foreign_kind(start: bytes) -> str | None:
-    """The kind of a file that begins so, and the way out; None: it may be text."""
+    """Return the kind of a file that begins so, and the way to a readable table; None: it may be text."""
     if _is_matlab_4(start):
         return _MATLAB_4
     begin = start.lstrip(b" \t\r\n") if start[:1] in b" \t\r\n" else start

@@ -1,4 +1,4 @@
-"""A look at the beginning of a delimited text: its delimiter, the line of names, the decimal mark."""
+"""Recognition of a delimited text by its beginning: its delimiter, the line of names, the decimal mark."""
 
 import re
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ class TextLook:
 
 
 def look(stream: BinaryIO, name: str) -> TextLook:
-    """Recognise the table in a text. Raises `UnreadableFile` where there is none."""
+    """Return the form of the table in a text, by its beginning. Raises `UnreadableFile` where there is none."""
     source = TextSource(stream, name, Bounds().unpacked_bytes)
     source.fill(LINE_BYTES)
     lines = source.glance().split(b"\n")[: LOOKED_AT + 1]

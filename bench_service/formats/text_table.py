@@ -21,7 +21,7 @@ MARKERS = "#%"
 
 
 class TextTable:
-    """The text after the lines that are no data, with the names of its columns."""
+    """Table of a delimited text after its head: its column names, its delimiter, the width of its lines."""
 
     def __init__(self, stream: BinaryIO, name: str, description: ImportDescription, bounds: Bounds) -> None:
         self.name = name
@@ -38,7 +38,7 @@ class TextTable:
             raise UnreadableFile(name, f"has {self.width} columns, at most {COLUMNS} are read")
 
     def cells(self, line: bytes) -> list[bytes]:
-        """Split a line into its cells, quotes kept."""
+        """Return the cells of a line, quotes kept."""
         bare = line.rstrip(b"\r\n")
         if self._delimiter == b" ":
             return bare.split()
@@ -146,7 +146,9 @@ class TextTable:
         )
 
     def indices(self, columns: Sequence[Column]) -> list[int]:
-        """Find the indices of the columns. Raises `UnreadableFile`."""
+        """Return the indices of the columns, from 0. Raises `UnreadableFile` for a column that the file does not
+        have.
+        """
         present = listed(self.names) if self.names else "0" if self.width == 1 else f"0 … {self.width - 1}"
         found: list[int] = []
         for column in columns:

@@ -55,7 +55,7 @@ class _Text:
 
 
 def guessed(name: str, file: str = "") -> LogColumn:
-    """Guess a column's meaning from its name; of a column x, y or z from the file's name too."""
+    """Return a column with the likely meaning of its name; of a column x, y or z of the file's name too."""
     guess = hint(name)
     if guess.quantity is None and name.lower() in ("x", "y", "z") and file:
         guess = hint(f"{file}_{name}")
@@ -64,7 +64,7 @@ def guessed(name: str, file: str = "") -> LogColumn:
 
 
 def in_dialect(found: TextLook, name: str) -> Understood:
-    """Understand a text by its dialect."""
+    """Return the table of a text with the meaning that its dialect gives."""
     stem = name.rpartition("/")[2].rpartition(".")[0]
     if found.names is None:
         return _without_names(found)

@@ -108,7 +108,7 @@ def unit_of(text: str, quantity: Quantity | Accumulated | None) -> str | None:
 
 
 def hint(name: str) -> Hint:
-    """Guess the meaning of a column from its name, or from the last part of its path."""
+    """Return the likely meaning of a column by its name, or by the last part of its path."""
     found = _hint(name)
     last = _last(name)
     return found if found.quantity is not None or found.doubt or last == name else _hint(last)

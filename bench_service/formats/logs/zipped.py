@@ -36,7 +36,7 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Zipped":
-    """Open an archive. Raises `UnreadableFile`."""
+    """Return a reader of a zip archive of texts. Raises `UnreadableFile`."""
     return Zipped(stream, name)
 
 
@@ -49,7 +49,7 @@ class _Drive:
 
 
 class Zipped:
-    """A zip archive of texts."""
+    """Reader of one zip archive of texts: a KITTI drive, or a table for each text. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name
@@ -98,13 +98,15 @@ class Zipped:
         return cast(BinaryIO, self._archive.open(member))
 
     def tables(self) -> list[LogTable]:
-        """List the drives, or the texts."""
+        """Return each drive as one table, or each text as one."""
         if self._drives:
             return [_drive_table(name, drive) for name, drive in self._drives.items()]
         return [_text_table(member, found) for member, found in self._looks.items()]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the rows of a drive, or of a text. Raises `UnreadableFile`."""
+        """Yield blocks of the rows of a drive, or of a text: for each named column its values, (n,). Raises
+        `UnreadableFile`.
+        """
         try:
             drive = self._drives.get(table.name)
             yield from self._text_rows(table, columns) if drive is None else self._drive_rows(drive, columns)

@@ -1,4 +1,4 @@
-"""Rows held against a proposal: the clocks by the one inspection of time stamps, and plain statistics."""
+"""Inspection of a file's rows for a proposal: the clocks, as an import inspects them, and plain statistics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ LENIENT: dict[str, Any] = {"gaps": "mark", "repeats": "drop", "unwrap_clock": Tr
 
 @dataclass
 class Values:
-    """Sums over all rows of some channels, raw values. `rows`: how many there are."""
+    """Running sums over all rows of some channels, raw values. `rows`: how many there are."""
 
     rows: int = 0
     sums: Array = field(default_factory=lambda: np.zeros(0))
@@ -65,7 +65,7 @@ class Values:
 
 
 def values_of(opened: Sequence[Opened], fields: dict[str, Any], channels: Sequence[dict[str, Any]]) -> Values:
-    """Look at the values of all rows. Raises `UnreadableFile`."""
+    """Read all rows of some channels and return their sums. Raises `UnreadableFile`."""
     description = ImportDescription.model_validate(
         {**fields, "unit": "U", "rate_hz": 1.0, "gaps": "mark", "channels": list(channels)}
     )
@@ -78,7 +78,8 @@ def values_of(opened: Sequence[Opened], fields: dict[str, Any], channels: Sequen
 def inspected(
     opened: Sequence[Opened], fields: dict[str, Any], channel: dict[str, Any], clock: LogClock, unit: str
 ) -> tuple[InspectedClock, dict[str, Any], list[str]]:
-    """Inspect a clock; return what was found, the description's fields that it needs, and what is not known.
+    """Inspect a clock; return what was found, the description's fields that it needs, and sentences on what is not
+    known.
 
     `unit`: unit of time that its name gives; empty: it gives none.
     """

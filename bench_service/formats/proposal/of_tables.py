@@ -1,4 +1,6 @@
-"""Delimited text, Parquet and Arrow as tables of the shape that logs have, with what dialects are known to mean."""
+"""Delimited text, Parquet and Arrow as tables of the shape that logs have, with the meaning that known dialects
+give.
+"""
 
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
@@ -27,7 +29,7 @@ class Table:
 
 
 def table_of(stream: BinaryIO, name: str) -> Table:
-    """Look at a table of text or of columns. Raises `UnreadableFile`."""
+    """Return a table of text or of columns, after a look at its beginning. Raises `UnreadableFile`."""
     return _columnar(stream, name) if is_columnar(stream) else _text(look(stream, name), name)
 
 

@@ -1,4 +1,4 @@
-"""The way to a proposed description: format, table, columns, units, clocks, and what a person has to decide."""
+"""Makes a proposed description of a file: format, table, columns, units, clocks, and what a person has to decide."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -28,7 +28,9 @@ NAMED_BY_PEOPLE = ("text", "phone", "xsens", "ros", "parquet", "arrow", "mat5", 
 
 
 def propose(file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
-    """Propose a description of one file. Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`."""
+    """Return a proposed description of one file; reads all rows. Raises `UnreadableFile`, `UnfitRecording`,
+    `BadParameter`.
+    """
     found = format_of(file.stream, form)
     if found is None:
         own = own_export(file.stream)

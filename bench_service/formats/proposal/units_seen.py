@@ -1,4 +1,4 @@
-"""Units and scales held against what a unit at rest must show: |f| near g."""
+"""Units and scales compared with what a unit at rest must show: |f| near g."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ _FASTEST_RAD_S = 40.0
 def with_units(
     columns: Sequence[LogColumn], values: Values, rate_hz: float | None
 ) -> tuple[list[LogColumn], list[str], list[str]]:
-    """Give columns without a unit the likely one; return them, what is not known, and notes."""
+    """Return the columns, those without a unit with the likely one; sentences on what is not known; and notes."""
     asks: list[str] = []
     notes: list[str] = []
     found = list(columns)
@@ -75,7 +75,7 @@ def _force_unit(columns: Sequence[LogColumn], places: Sequence[int], values: Val
 
 
 def suspicions(columns: Sequence[LogColumn], values: Values, rate_hz: float | None) -> list[str]:
-    """Describe values that no unit of these scales at rest has, and channels that do not move."""
+    """Return sentences about values that no unit of these scales at rest has, and about channels that do not move."""
     found = [
         f"channel {c.channel} ({c.name}) has one value throughout: {values.means[i]:.6g}"
         for i, c in enumerate(columns)

@@ -50,7 +50,7 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Hdf5":
-    """Open an HDF5 file. Raises `UnreadableFile`."""
+    """Return a reader of an HDF5 file. Raises `UnreadableFile`."""
     return Hdf5(stream, name)
 
 
@@ -65,7 +65,7 @@ class _Place:
 
 
 class Hdf5:
-    """Reader of an HDF5 file."""
+    """Reader of one HDF5 file, MATLAB 7.3 among them. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name
@@ -133,7 +133,7 @@ class Hdf5:
             self._notes.append(words)
 
     def tables(self) -> list[LogTable]:
-        """List the datasets, those of one length as one table. Raises `UnreadableFile` where there is none."""
+        """Return the datasets as tables, those of one length as one. Raises `UnreadableFile` where there is none."""
         found = tables_by_length([p.array for p in self._arrays.values()], self._notes, self._rates)
         if not found:
             raise UnreadableFile(
@@ -142,7 +142,7 @@ class Hdf5:
         return found
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield rows of the datasets' columns. Raises `UnreadableFile`."""
+        """Yield blocks of rows: for each named column its values, (n,). Raises `UnreadableFile`."""
         places = {name: (p, i) for p in self._arrays.values() for i, name in enumerate(p.array.columns)}
         wanted = [places[name] for name in columns]
         count = table.rows or 0

@@ -53,7 +53,7 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Mat5":
-    """Open a MATLAB file. Raises `UnreadableFile`."""
+    """Return a reader of a MATLAB file. Raises `UnreadableFile`."""
     return Mat5(stream, name)
 
 
@@ -69,7 +69,7 @@ class _Place:
 
 
 class Mat5:
-    """A MATLAB file of level 5."""
+    """Reader of one MATLAB file of level 5. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -188,7 +188,7 @@ class Mat5:
             self._notes.append(words)
 
     def tables(self) -> list[LogTable]:
-        """List the arrays, those of one length as one table. Raises `UnreadableFile` where there is none."""
+        """Return the arrays as tables, those of one length as one. Raises `UnreadableFile` where there is none."""
         found = tables_by_length([p.array for p in self._arrays.values()], self._notes, self._rates)
         if not found:
             why = "; ".join(self._notes) or "it holds only single numbers"
@@ -196,7 +196,7 @@ class Mat5:
         return found
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield rows of the arrays' columns. Raises `UnreadableFile`."""
+        """Yield blocks of rows: for each named column its values, (n,). Raises `UnreadableFile`."""
         places = {name: (p, i) for p in self._arrays.values() for i, name in enumerate(p.array.columns)}
         readers = [_Column(*places[name]) for name in columns]
         count = table.rows or 0

@@ -35,7 +35,7 @@ class NamedArray:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Return the names of its columns: its own, or name[0], name[1], …."""
+        """Names of its columns: its own, or name[0], name[1], …."""
         return (self.name,) if self.width == 1 else tuple(f"{self.name}[{i}]" for i in range(self.width))
 
 
@@ -50,7 +50,8 @@ class StatedRates:
         if _RATE.search(name) is None or len(self._found) > MOST_ARRAYS:
             return
         with suppress(TypeError, ValueError):
-            number = float(np.asarray(value).reshape(-1)[0]) if np.size(value) == 1 else 0.0
+            numbers = np.asarray(value).reshape(-1)
+            number = float(numbers[0]) if numbers.size == 1 else 0.0
             if 0.0 < number < inf:
                 self._found[name] = number
 
@@ -81,7 +82,7 @@ def lies(rows: int, width: int) -> bool:
 def tables_by_length(
     arrays: Sequence[NamedArray], notes: Sequence[str] = (), rates: StatedRates | None = None
 ) -> list[LogTable]:
-    """Build one table for each length that arrays have, the longest first; single numbers are no samples."""
+    """Return one table for each length that arrays have, the longest first; single numbers are no samples."""
     lengths: dict[int, list[NamedArray]] = {}
     for array in arrays:
         if array.rows > 1 and 1 <= array.width <= WIDEST:

@@ -26,12 +26,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Tdms":
-    """Open a TDMS file. Raises `UnreadableFile`."""
+    """Return a reader of a TDMS file. Raises `UnreadableFile`."""
     return Tdms(stream, name)
 
 
 class Tdms:
-    """A TDMS file: its metadata in memory, its data in chunks."""
+    """Reader of one TDMS file: its metadata in memory, its data in chunks. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name
@@ -48,7 +48,9 @@ class Tdms:
             self.warnings.append("the last segment of the file is cut off: what is before it was read")
 
     def tables(self) -> list[LogTable]:
-        """List the groups; channels of one length in a group are one table."""
+        """Return the groups as tables; channels of one length in a group are one table. Raises `UnreadableFile` where
+        there is none.
+        """
         found: list[LogTable] = []
         for group, channels in self._groups.items():
             lengths = sorted({len(c) for c in channels.values() if len(c) > 1}, reverse=True)
@@ -86,7 +88,7 @@ class Tdms:
         return LogTable(title, tuple(columns), tuple(clocks), rate, rows, tuple(notes))
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the channels' values chunk by chunk. Raises `UnreadableFile`."""
+        """Yield blocks of rows, chunk by chunk: for each named column its values, (n,). Raises `UnreadableFile`."""
         group = table.name if table.name in self._groups else table.name.rpartition(", ")[0]
         waiting: dict[str, list[Numbers]] = {name: [] for name in columns if name != SAMPLE_TIME}
         done = 0
