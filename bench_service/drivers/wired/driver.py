@@ -118,6 +118,11 @@ class BenchFileDriver:
             link.close()
             raise
 
+    def warm_up(self) -> None:
+        """Load what a simulated unit needs, where the bench file has one."""
+        if self._file.within("unit_link"):
+            self._simulated.warm_up()
+
     def _need_devices(self, needs: BenchNeeds) -> None:
         before = dict(self._found)
         failures = self._look()
