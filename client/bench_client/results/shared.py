@@ -191,7 +191,7 @@ class ScalarCheck(Part):
 
 
 class BudgetRow(Part):
-    """One source of uncertainty of one coefficient."""
+    """One source of uncertainty of one coefficient: value, distribution, divisor, sensitivity, contribution."""
 
     source: str
     """Source"""
@@ -212,7 +212,7 @@ class BudgetRow(Part):
 
 
 class Budget(Part):
-    """Uncertainty budget of one coefficient."""
+    """Uncertainty budget of one coefficient: rows by source, and the expanded uncertainty."""
 
     coefficient: str
     """Name of the coefficient, such as gyro.K11"""
@@ -233,7 +233,7 @@ class Budget(Part):
 
 
 class TriadSummary(Part):
-    """Complete calibration results of one triad."""
+    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets. JSON-ready."""
 
     calibration: TriadCalibration
     """Calibration of the triad"""
@@ -264,7 +264,9 @@ class TriadSummary(Part):
     left_out: Magnitudes | None = None
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
     suspect: str = ""
-    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
+    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared.
+    `triad_analysis.suspected` finds it from all triads of the same stations.
+    """
     budgets: tuple[Budget, ...] = ()
     """Uncertainty budget of each coefficient; empty in results of older versions."""
 

@@ -91,5 +91,5 @@ class RecursiveBias:
 
 
 def white_covariance(variance: float, count: int) -> Array:
-    """Return the white-noise covariance of textbook S: R on the diagonal, shape (n, n)."""
+    """Return the covariance of white noise: R on the diagonal, shape (n, n)."""
     return variance * np.eye(count)
