@@ -150,7 +150,7 @@ def create_app(
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncGenerator[None]:
         late.begin(partial(_add_nouns, app, service))
-        service.begin([figures.warm_up], answers=True)
+        service.begin(answers=True)
         try:
             yield
         finally:

@@ -1,7 +1,7 @@
 """One service of a process: the services of each noun, and its life from registration to its end."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from bench_service.access.book import AccessBook
@@ -135,18 +135,17 @@ class BenchService:
                 log.warning("bench %s: %s", self._driver.description.id, self._missing)
             self.safety.at_start(self._driver.description.id, self._rescued)
 
-    def begin(self, warm_up: Sequence[Callable[[], object]] = (), answers: bool = False) -> None:
+    def begin(self, answers: bool = False) -> None:
         """Begin to work while the service already answers. The bench's lease must be held.
 
         `answers`: this process answers clients, which keeps leases of manual mode alive.
-        `warm_up` is called while no job runs, once the engine runs and the numerics are loaded.
         """
         if answers:
             self._presence.begin()
         if self._runner is not None and self._runner.resumes:
             self._runner.begin()
         if self._worker is not None:
-            self._worker.begin([lambda: self.catalogue.procedures, lambda: self.catalogue.methods, *warm_up])
+            self._worker.begin([lambda: self.catalogue.procedures, lambda: self.catalogue.methods])
             self.campaigns.conductor.begin()
             self._nightly.begin()
 

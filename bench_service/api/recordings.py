@@ -17,7 +17,8 @@ from bench_service.api.http.queries import Searched
 from bench_service.evidence.admission import Places
 from bench_service.evidence.recordings import require_undamaged
 from bench_service.formats.description import ImportDescription
-from bench_service.formats.export import ExportFormat, Extract, export, export_bytes, extract
+from bench_service.formats.export import Extract, export, export_bytes, extract
+from bench_service.formats.export_format import ExportFormat
 from bench_service.formats.import_request import ImportFile
 from bench_service.formats.overview import overview
 from bench_service.formats.plain_json import shown

@@ -1,6 +1,6 @@
 """The known benches: the one that this process drives, and all that workers have registered."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.registry import BenchRegistry
@@ -80,6 +80,15 @@ class BenchDirectory:
         units = [self._units.unit(name) for name in self._registry.mounted(bench_id)]
         drawn = self._drawn(serial) if serial is not None and description.simulated else None
         return tuple(units) if drawn is None else (*units, drawn)
+
+    def testable(self, serials: Iterable[str]) -> frozenset[str]:
+        """Select the units that some bench can test: those that it has, and those that a simulated one draws."""
+        wanted, found = frozenset(serials), set[str]()
+        for bench_id in self.ids():
+            found |= {unit.serial for unit in self.mounted(bench_id)}
+            if self.description(bench_id).simulated:
+                found |= {serial for serial in wanted - found if self._drawn(serial) is not None}
+        return wanted & found
 
     def driven(self, bench_id: str) -> bool:
         """Return whether a worker drives the bench now, that is, whether some process holds its lease."""

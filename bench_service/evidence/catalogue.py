@@ -6,6 +6,7 @@ All of them import the whole of the numerics, which takes most of a second; a si
 import logging
 from collections.abc import Mapping
 from functools import cached_property
+from threading import Thread
 from typing import Any, TypeVar
 
 from bench_service.model.errors import NotFound
@@ -31,6 +32,7 @@ class Catalogue:
         self._left_out: dict[tuple[str, str], str] = {}
         self._alone: dict[tuple[str, str], Any] = {}
         """Entries that were read by their names, before or apart from all the others."""
+        self._reading: Thread | None = None
 
     @cached_property
     def procedures(self) -> Mapping[str, AnyProcedure]:
@@ -49,6 +51,22 @@ class Catalogue:
     def method(self, name: str) -> AnyMethod:
         """Return a method by name. Raises `NotFound`, with the reason where its file is broken."""
         return self._required("method", name)
+
+    def titles(self) -> Mapping[str, str]:
+        """Title of each procedure and method by its name, of those that have been read.
+
+        Reading them all takes a second or two: the first call begins it in a thread and waits for nothing.
+        """
+        if "procedures" in self.__dict__ and "methods" in self.__dict__:
+            return self._titles
+        if self._reading is None:
+            self._reading = Thread(target=lambda: self._titles, name="titles", daemon=True)
+            self._reading.start()
+        return {name: entry.title for (_, name), entry in list(self._alone.items())}
+
+    @cached_property
+    def _titles(self) -> Mapping[str, str]:
+        return {name: entry.title for name, entry in (*self.methods.items(), *self.procedures.items())}
 
     def notes(self) -> tuple[str, ...]:
         """Return a sentence for each file that was left out so far."""

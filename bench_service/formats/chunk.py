@@ -4,14 +4,13 @@ Knows how samples become bytes and come back bit for bit. Must not know where th
 
 Counts of a unit at rest are near-constant plus noise, so int32 columns are delta-encoded (miniblocks as narrow as
 the noise) and then zstd; float64 columns are split into byte streams, so that equal exponents lie side by side.
+Arrow is imported where a chunk is encoded or decoded: a service that starts does without.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from procedures.core.recording import RawArray
 
@@ -50,6 +49,9 @@ def rows_per_chunk(channels: int, dtype: SampleType) -> int:
 
 def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> bytes:
     """Return samples, shape (n, channels), as the bytes of a Parquet file with one column for each channel."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     encoding = ENCODINGS[samples.dtype.name]
     schema = pa.schema(
         [pa.field(name, pa.from_numpy_dtype(samples.dtype), nullable=False) for name in names],
@@ -74,6 +76,9 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
 
 def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
     """Return the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     try:
         table = pq.ParquetFile(pa.BufferReader(payload)).read(columns=list(names), use_threads=False)
         columns = [table.column(name).to_numpy() for name in names]

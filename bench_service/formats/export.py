@@ -9,7 +9,6 @@ import io
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -18,29 +17,10 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from bench_service.formats.chunk import RAW_BYTES, sample_type
+from bench_service.formats.export_format import ExportFormat
 from bench_service.formats.outbox import Outbox
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
-
-
-class ExportFormat(StrEnum):
-    """File format of an exported recording."""
-
-    ARROW = "arrow"
-    PARQUET = "parquet"
-    CSV = "csv"
-    NPY = "npy"
-
-    @property
-    def media_type(self) -> str:
-        """Return the format's media type for HTTP."""
-        return {
-            "arrow": "application/vnd.apache.arrow.stream",
-            "parquet": "application/vnd.apache.parquet",
-            "csv": "text/csv; charset=utf-8",
-            "npy": "application/octet-stream",
-        }[self.value]
-
 
 HELD = {ExportFormat.ARROW: 4, ExportFormat.PARQUET: 5, ExportFormat.CSV: 8, ExportFormat.NPY: 4}
 """Times a chunk's raw bytes that an export of it holds: as read, as columns, and as text or as a page of the file."""

@@ -46,7 +46,7 @@ class StopEntry:
         running = self._queue.running(bench_id) if stop.stands else None
         if running is not None:
             with suppress(IllegalTransition, NotUnderstood):  # it has ended this moment; or this version cannot read it
-                self._jobs.request_cancel(running.id, now())
+                self._jobs.request_cancel(running.id, now(), word.by, f"stop of bench {bench_id}: {reason}")
         self._note(word, stop)
         return None if running is None else running.id
 

@@ -5,6 +5,7 @@ The stored context names the unit's calibrations by their ids: their coefficient
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -15,20 +16,24 @@ from bench_service.model.job import Job
 from procedures.core.errors import DomainError
 from procedures.procedure import Context
 
-CONTEXT = TypeAdapter(Context)
+
+@cache
+def _adapter() -> TypeAdapter[Context]:
+    """Build what reads and writes contexts when the first one comes: it takes as long as the imports of a room."""
+    return TypeAdapter(Context)
 
 
 def context_document(context: Context) -> dict[str, Any]:
     """Return the context of a job as a JSON object, without the coefficients of calibrations that have an id."""
     unit = context.unit
     stored = len(unit.calibration_ids) == len(unit.calibrations)
-    return CONTEXT.dump_python(context, mode="json", exclude={"unit": {"calibrations"}} if stored else None)
+    return _adapter().dump_python(context, mode="json", exclude={"unit": {"calibrations"}} if stored else None)
 
 
 def context_of(job: Job, calibrations: Callable[[Sequence[str]], Sequence[StoredCalibration]]) -> Context:
     """Return a job's context, read back from JSON, with the `calibrations` that it names. Raises `NotUnderstood`."""
     try:
-        context = CONTEXT.validate_python({**job.context, "unit": unit_document(job.context)})
+        context = _adapter().validate_python({**job.context, "unit": unit_document(job.context)})
     except (ValueError, DomainError) as error:
         raise NotUnderstood(job.id, job.code_version, error) from error
     unit = context.unit

@@ -34,7 +34,9 @@ def queue_page(request: Request) -> HTMLResponse:
 @router.get("/units")
 def units_page(request: Request) -> HTMLResponse:
     """Return the HTML page of all units, with what is known of each."""
-    return _page(request, "units.html", units=service_of(request).stores.units.units())
+    service = service_of(request)
+    units = service.stores.units.units()
+    return _page(request, "units.html", units=units, testable=service.benches.testable(unit.serial for unit in units))
 
 
 @router.get("/recordings")

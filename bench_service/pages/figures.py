@@ -14,9 +14,10 @@ _elsewhere: list[WorkProcesses] = []
 """The processes that draw, where it is not this one."""
 
 
-def warm_up() -> None:
-    """Have the drawing processes load matplotlib, so that the first plot is not delayed. Returns at once."""
-    svg(SMALLEST)
+def expect() -> None:
+    """Begin the process that draws: a person has opened a page, and will come to a figure."""
+    for processes in _elsewhere:
+        processes.begin()
 
 
 def draw_in(processes: WorkProcesses | None) -> None:

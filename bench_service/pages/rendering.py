@@ -1,5 +1,6 @@
 """Rendering shared by all pages: templates, the filters in them, and the service behind the request."""
 
+import json
 import re
 from datetime import UTC, datetime
 from math import isfinite
@@ -13,6 +14,7 @@ from markupsafe import Markup, escape
 from bench_service.access.identity import Identity, Proof
 from bench_service.formats.printed import digits
 from bench_service.model.errors import ServiceError
+from bench_service.pages import figures
 from bench_service.pages.languages import (
     LANGUAGE,
     LANGUAGES,
@@ -32,6 +34,7 @@ def service_of(request: Request) -> BenchService:
 
 def _shell(request: Request) -> dict[str, Any]:
     """Frame of every page around its content. It needs no database: the stop stands on pages of errors, too."""
+    figures.expect()
     language = language_of(request)
     LANGUAGE.set(language)
     service = service_of(request)
@@ -39,7 +42,15 @@ def _shell(request: Request) -> dict[str, Any]:
         benches = list(service.benches.ids())
     except ServiceError:
         benches = [] if service.live.own is None else [service.live.own]
-    return {"language": language, "languages": LANGUAGES, "words": words_address(language), "stop_benches": benches}
+    titles = service.catalogue.titles()
+    return {
+        "language": language,
+        "languages": LANGUAGES,
+        "words": words_address(language),
+        "stop_benches": benches,
+        "titled": lambda name: translated(titles.get(name, name)),
+        "titles": json.dumps({name: translated(title) for name, title in titles.items()}, ensure_ascii=False),
+    }
 
 
 templates = Jinja2Templates(Path(__file__).parent / "templates", context_processors=[_shell])

@@ -72,6 +72,21 @@ def test_columns_that_no_name_tells_are_named_by_the_person(window: Watched, tmp
     expect(page.locator("#main")).to_contain_text("50 Hz")
 
 
+def test_a_unit_that_no_bench_has_cannot_be_started_and_the_page_says_why_once(window: Watched) -> None:
+    window.expected = re.compile("status of 422")
+    page = window.open("/start?unit=PAPER-9&procedure=calibration_12_orientations")
+    expect(page.locator("#nowhere")).to_contain_text("has no unit 'PAPER-9'")
+    expect(page.locator("#refusal")).to_contain_text("has no unit 'PAPER-9'")
+    expect(page.locator("#cards")).not_to_contain_text("PAPER-9")
+    expect(page.get_by_role("button", name="Start", exact=True)).to_be_disabled()
+    expect(page.get_by_role("button", name="Calibrate, then verify")).to_be_disabled()
+    page.locator("#unit").fill("SIM-0001")
+    page.locator("#unit").press("Tab")
+    expect(page.get_by_role("button", name="Calibrate, then verify")).to_be_enabled()
+    expect(page.locator("#nowhere")).to_be_hidden()
+    expect(page.locator("#refusal")).to_be_empty()
+
+
 def test_a_campaign_is_made_started_and_scheduled_by_forms(window: Watched, service: BenchProcess) -> None:
     page = window.open("/campaigns")
     page.get_by_role("button", name="New campaign").click()
@@ -149,7 +164,7 @@ def test_a_batch_is_started_from_a_search_followed_and_asked_for_its_failures(
     page.get_by_role("button", name="Run the method").click()
     expect(page.locator("#refusal")).to_contain_text("The batch is queued")
     batch = page.locator("#batches tr[data-batch]").first
-    expect(batch).to_contain_text("12 of 12", timeout=60_000)
+    expect(batch).to_contain_text("12 of 12", timeout=100_000)
     expect(batch).to_contain_text(f"Job {calibrated}")
     expect(batch.locator(".badge")).to_have_text("succeeded")
     batch.get_by_text("Results and failures").click()
@@ -161,7 +176,7 @@ def test_a_batch_is_started_from_a_search_followed_and_asked_for_its_failures(
     page.locator("#method").select_option("noise_analysis")
     page.get_by_role("button", name="Run the method").click()
     short = page.locator("#batches tr[data-batch]").first
-    expect(short).to_contain_text("1 of 1", timeout=60_000)
+    expect(short).to_contain_text("1 of 1", timeout=100_000)
     expect(short.locator(".badge")).to_have_text("failed")
     short.get_by_text("Results and failures").click()
     expect(short).to_contain_text("too few for a noise analysis")
@@ -183,7 +198,7 @@ def test_a_batch_takes_what_the_last_search_shows_and_a_job_by_its_number(
     page.locator("#each").select_option("recording")
     page.get_by_role("button", name="Run the method").click()
     batch = page.locator("#batches tr[data-batch]").first
-    expect(batch).to_contain_text(f"{count} of {count}", timeout=60_000)
+    expect(batch).to_contain_text(f"{count} of {count}", timeout=100_000)
     expect(batch).to_contain_text(f"Job {calibrated}")
 
 

@@ -1,6 +1,7 @@
 """The unit's record in a printed report: noise and what is in use, as a job found them and as its result left them."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -16,8 +17,6 @@ from bench_service.model.records import StoredResult
 from procedures.core.errors import DomainError
 from procedures.core.recording import TRIADS
 from procedures.core.unit import CORRECTION_IDS, TriadRecord, Unit
-
-UNIT: TypeAdapter[Unit] = TypeAdapter(Unit)
 
 
 def found_and_left(
@@ -64,10 +63,15 @@ def _corrections(stores: EvidenceStores, result: StoredResult) -> dict[str, str]
     return {c.correction.kind: c.id for c in found if c.result_id == result.id}
 
 
+@cache
+def _adapter() -> TypeAdapter[Unit]:
+    return TypeAdapter(Unit)
+
+
 def _units(catalogue: Catalogue, result: StoredResult, of_job: bool) -> tuple[Unit | None, Unit | None]:
     """The unit as the job found it, and as the job's own result left it; None where this release cannot read one."""
     try:
-        before = UNIT.validate_python(unit_document(result.context))
+        before = _adapter().validate_python(unit_document(result.context))
         if not of_job:
             return before, before
         entry = catalogue.procedure(result.name)

@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from math import sqrt
 from typing import Any
 
-from scipy.stats import chi2
-
 from bench_service.formats.certificate.laboratory import Contact, Laboratory
 from bench_service.formats.certificate.tree import Element, etree
 
@@ -176,6 +174,8 @@ def _equipment(parent: Element, laboratory: Laboratory) -> None:
 
 
 def _coefficients(parent: Element, triad: Mapping[str, Any]) -> None:
+    from scipy.stats import chi2  # with all of scipy's statistics: only where it is called
+
     rows, covariance = triad["coefficients"], triad["covariance"]["matrix"]
     units = [UNITS[row["unit"]] for row in rows]
     _si(parent, "labelXMLList", " ".join(row["name"] for row in rows))

@@ -50,7 +50,8 @@ class StatedRates:
         if _RATE.search(name) is None or len(self._found) > MOST_ARRAYS:
             return
         with suppress(TypeError, ValueError):
-            number = float(np.asarray(value).reshape(-1)[0]) if np.size(value) == 1 else 0.0
+            numbers = np.asarray(value).reshape(-1)
+            number = float(numbers[0]) if numbers.size == 1 else 0.0
             if 0.0 < number < inf:
                 self._found[name] = number
 
