@@ -58,9 +58,7 @@ class NoiseLimits(Parameters):
 
 
 class NoiseParameters(JudgedParameters):
-    """Steps of the analysis, each of which can be switched off; the effect of each is in the result's table of
-    steps.
-    """
+    """Steps of the analysis, each of which can be switched off; the effect of each is in the result's table."""
 
     cell_s: float = Field(1.0, gt=0.0, le=3600.0, description="cell whose means the slow part works on")
     full_rate: bool = Field(True, description="also use what is faster than a cell, where the noise model describes it")

@@ -1,4 +1,4 @@
-"""Limits on a calibration held against its plan: those that it cannot resolve, and the check of the bias in run."""
+"""Limits on a calibration compared with its plan: those that it cannot resolve, and the check of the bias in run."""
 
 from dataclasses import dataclass
 
@@ -45,7 +45,9 @@ def run_to_run_requirements(
     accelerometer_bias_m_s2: float,
     accelerometer_scale_ppm: float,
 ) -> tuple[Requirement, ...]:
-    """The limits on stability from launch to launch (thesis 4.3, 5.6); without that of the gyro scale where None."""
+    """Return the limits on stability from launch to launch (thesis 4.3, 5.6); without that of the gyro scale where
+    None.
+    """
     deg_h, ppm = units.DEG_PER_HOUR, units.PPM
     scale = () if gyro_scale_ppm is None else (gyro_scale_ppm * ppm,)
     return (
@@ -93,7 +95,8 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
 def in_run_unresolved(
     plan: TriadPlan, limit: float, display: str, display_size: float, *, in_sample: bool = False
 ) -> str | None:
-    """Warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI].
+    """Return a warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI];
+    else None.
 
     `in_sample`: of a calibration at its own stations, which follows a part of the noise.
     """
