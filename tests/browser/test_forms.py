@@ -42,7 +42,14 @@ def test_a_file_is_imported_after_what_it_does_not_say_was_answered(window: Watc
     expect(go).to_be_disabled()
     page.locator("#import-unit").fill("PAPER-1")
     page.locator("#import-rate").fill("100")
+    doubt = page.locator("#import-doubts label").filter(has=page.get_by_text(re.compile("taken as rad/s")))
+    doubt.locator("input").check()
     page.get_by_label("Unit gyro_x").select_option("deg/s")
+    expect(page.get_by_label("Unit gyro_y")).to_have_value("deg/s")  # of one triad
+    told = page.locator("#import-doubts label").filter(has_text="You chose the units: gyro_x deg/s, gyro_y deg/s")
+    expect(told.locator("input")).not_to_be_checked()
+    page.get_by_label("Unit gyro_y").select_option("deg/h")
+    expect(page.get_by_label("Unit gyro_x")).to_have_value("deg/s")  # given by hand
     page.get_by_role("checkbox", name="Import gyro_y").uncheck()
     for box in page.locator("#import-doubts input").all():
         box.check()
