@@ -59,7 +59,7 @@ def test_the_form_follows_the_schema_and_the_preview_follows_the_form(window: Wa
     expect(page.get_by_role("button", name="Start", exact=True)).to_be_disabled()
     dwell.fill("5")
     page.get_by_label("Settle, s").fill("0.5")
-    page.get_by_text("Priority, time, labels").click()
+    page.get_by_text("Priority, labels").click()
     page.get_by_label("Labels: name=value").fill("shift=night")
     page.get_by_role("button", name="Start", exact=True).click()
     job = ended(service, job_in(page))
