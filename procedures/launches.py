@@ -58,7 +58,9 @@ class NoiseLimits(Parameters):
 
 
 class NoiseParameters(JudgedParameters):
-    """Steps of the analysis, each can be switched; what it changes is in the result's table of steps."""
+    """Steps of the analysis, each of which can be switched off; the effect of each is in the result's table of
+    steps.
+    """
 
     cell_s: float = Field(1.0, gt=0.0, le=3600.0, description="cell whose means the slow part works on")
     full_rate: bool = Field(True, description="also use what is faster than a cell, where the noise model describes it")
@@ -83,7 +85,7 @@ class NoiseParameters(JudgedParameters):
     noise_limits: NoiseLimits = Field(default_factory=lambda: NoiseLimits.model_validate({}))
 
     def settings(self) -> LaunchSettings:
-        """Convert to the settings of the numerics."""
+        """Return the settings of the numerics."""
         return LaunchSettings(
             cell_s=self.cell_s,
             fast=self.full_rate,
@@ -264,7 +266,9 @@ def _absent(channel: str, process: str) -> str:
 def surroundings_checks(
     launches: Sequence[LaunchNoise], channels: Sequence[ChannelSummary], limits: NoiseLimits
 ) -> list[Check]:
-    """Readiness, absence of rate random walk and ramp, and base vibration, each where its limit is given."""
+    """Return the checks of readiness, absence of rate random walk and ramp, and base vibration, each where its limit is
+    given.
+    """
     found: list[Check] = []
     for index, s in enumerate(channels):
         of_launches = [launch.channels[index] for launch in launches]

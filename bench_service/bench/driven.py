@@ -8,6 +8,7 @@ from concurrent.futures import CancelledError, Future
 from typing import Any, TypeVar
 
 from bench_service.background import NonBlockingQuery
+from bench_service.bench.held_loop import HeldLoop
 from bench_service.bench.observed import ObservedBench
 from bench_service.bench.watchdog import TimeLimits, Watchdog
 from bench_service.model.errors import StorageFailure
@@ -56,7 +57,8 @@ class DrivenBench:
         """
         self._stop_stands = stop_stands
         self._name = name
-        self._watchdog = Watchdog(bench.clock, bench.description.origin == "simulated", TIME_LIMITS)
+        simulated = bench.description.origin == "simulated"
+        self._watchdog = Watchdog(bench.clock, simulated, TIME_LIMITS, bench.safe_s)
         self._bench = ObservedBench(bench, self._watchdog)
         self._stop_wanted = NonBlockingQuery("stop", stop_wanted)
         self._unanswered_s = 0.0
@@ -123,8 +125,17 @@ class DrivenBench:
                 return
             if self._lost is not None or self._closed:
                 raise Disconnected(self._lost or "the session ended before its devices were safe")
-            self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
+            try:
+                self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
+            except ExceptionGroup:
+                self._leave_late_drivers()
+                raise
             self._is_safe = True
+
+    def _leave_late_drivers(self) -> None:
+        """Count the bench's thread as lost where a driver that was late does not return: a new link avoids it."""
+        if self._lost is None and not self._unwinds():
+            self._lose("a device was not safe in time")
 
     def close(self) -> None:
         """End the thread, and give the devices' links back: later requests to them are refused.
@@ -157,6 +168,7 @@ class DrivenBench:
 
     def _wait(self, future: "Future[T]", stoppable: bool = True) -> T:
         looked_s = monotonic_s()
+        held = None if stoppable or not self._bench.safe_s else HeldLoop(self._loop)
         while True:
             try:
                 return future.result(timeout=STOP_CHECK_S)
@@ -166,6 +178,8 @@ class DrivenBench:
             now_s = monotonic_s()
             passed_s = now_s - looked_s
             silence = self._watchdog.silence(passed_s, 2 * STOP_CHECK_S)
+            if held is not None and held.for_s(min(passed_s, 2 * STOP_CHECK_S)) > TIME_LIMITS.verb_s:
+                silence = f"a driver has held the thread of all devices for {TIME_LIMITS.verb_s:g} s"
             looked_s = now_s
             if silence is not None:
                 self._cancel(future, silence)
@@ -195,8 +209,11 @@ class DrivenBench:
         """Cancel a coroutine on the bench's loop and wait until it has unwound, or is lost."""
         future.cancel()
         if not self._unwinds():
-            self._lost = why
-            log.error("%s, bench %s: %s, and its driver does not return", self._name, self._bench.description.id, why)
+            self._lose(why)
+
+    def _lose(self, why: str) -> None:
+        self._lost = why
+        log.error("%s, bench %s: %s, and its driver does not return", self._name, self._bench.description.id, why)
 
     def _unwinds(self) -> bool:
         """Wait until the work has unwound, as it also has once another thread has ended the session; False: lost."""

@@ -21,7 +21,9 @@ class DrivingSession(Protocol):
     """The part of a job's session that is needed here (`bench_service.bench.session.BenchSession`)."""
 
     def make_safe(self) -> None:
-        """Make the devices safe. Raises an `ExceptionGroup`, and `Disconnected` where a device does not answer."""
+        """Make the devices safe, and wait until they are. Raises an `ExceptionGroup`, and `Disconnected` where a device
+        does not answer.
+        """
         ...
 
     def close(self) -> None:
@@ -31,7 +33,9 @@ class DrivingSession(Protocol):
 
 @dataclass(frozen=True)
 class Obstacle:
-    """The reasons why a bench could not be made safe."""
+    """Reasons for which a bench could not be made safe: one sentence a failure; `busy`: another process has the
+    devices' link.
+    """
 
     reasons: tuple[str, ...]
     busy: bool = False
@@ -39,7 +43,7 @@ class Obstacle:
 
     @property
     def why(self) -> str:
-        """All reasons in one line."""
+        """All reasons in one line, joined by semicolons."""
         return "; ".join(self.reasons)
 
     def __str__(self) -> str:
@@ -48,7 +52,9 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class RoadEnd:
-    """The outcome of making a bench safe after a job's session."""
+    """Outcome of making a bench safe after a job's session: the obstacle that remains, and the failure of the session's
+    own link.
+    """
 
     obstacle: Obstacle | None = None
     """The failure that remains; None: the bench is safe."""
@@ -57,8 +63,8 @@ class RoadEnd:
 
 
 def over_new_link(devices: BenchDevices, by: str) -> Obstacle | None:
-    """Make devices safe that no job of this process has; None where they are safe then. Safe devices get no
-    command.
+    """Open a link to devices that no job of this process has, and make them safe; return what hindered it, None where
+    they are safe. Safe devices get no command.
     """
     try:
         devices.make_safe(by)
@@ -103,7 +109,9 @@ def over_the_jobs_link(session: DrivingSession) -> tuple[tuple[str, ...], bool]:
 
 
 def whole_road(session: DrivingSession, devices: BenchDevices, by: str, given_back: Callable[[], None]) -> RoadEnd:
-    """Make the bench of a job's session safe, and end the session. `given_back` is called once its link is."""
+    """Make the bench of a job's session safe, over the session's link and else over a new one, and end the session;
+    return how it went. `given_back` is called once the session's link is closed.
+    """
     failed: tuple[str, ...] = ()
     new_link_may_help = True
     try:

@@ -44,7 +44,9 @@ log = logging.getLogger(__name__)
 
 
 class Supervisor:
-    """Watches one bench until it is ended, or nothing is left to watch."""
+    """Watches one bench from a process of its own, and makes it safe where the worker is dead or hangs; runs until it
+    is ended, or nothing is left to watch.
+    """
 
     def __init__(
         self,
@@ -87,7 +89,7 @@ class Supervisor:
         self._looked_s = monotonic_s()
 
     def run(self, ending: Event, companion: bool) -> None:
-        """Watch until `ending` is set; a `companion` also ends with the process that it accompanies."""
+        """Watch, and block, until `ending` is set; a `companion` also ends with the process that it accompanies."""
         listening = self._channel.listen(SUPERVISOR)
         try:
             while not ending.is_set() and self._look_once(listening, ending, companion):

@@ -17,6 +17,8 @@ HUNG_S = 10.0
 """Shortest time that a worker is given from seeing a stop until the bench is safe, before it is killed [s]."""
 MARGIN_S = 5.0
 """Time beyond the declared time of the slowest device [s]: the work is left first, and the devices are read back."""
+ENDING_S = 20.0
+"""Shortest time that a service that ends waits for its bench to be safe [s]."""
 COUNTED_S = 0.5
 """Maximum part of the time between two looks that counts [s]: this process may have been held up itself."""
 
@@ -28,6 +30,11 @@ def hung_after_s(safe_s: float) -> float:
     is killed while a table brakes for its declared 60 s would leave it in mid-braking.
     """
     return max(HUNG_S, safe_s + MARGIN_S)
+
+
+def ending_s(safe_s: float) -> float:
+    """Time that a service that ends waits for its bench to be safe [s]; `safe_s` as for `hung_after_s`."""
+    return max(ENDING_S, safe_s + 2.0 * MARGIN_S)
 
 
 class WorkerPatience:

@@ -24,7 +24,9 @@ log = logging.getLogger(__name__)
 
 
 class Catalogue:
-    """Procedures and methods by name. A file that cannot be read is left out, and named in the log and in `notes`."""
+    """Procedures and methods by name, imported from their folders. A file that cannot be read is left out, and named in
+    the log and in `notes`.
+    """
 
     def __init__(self) -> None:
         self._left_out: dict[tuple[str, str], str] = {}
@@ -34,12 +36,12 @@ class Catalogue:
 
     @cached_property
     def procedures(self) -> Mapping[str, AnyProcedure]:
-        """Every procedure by name, read when it is first wanted."""
+        """All procedures by name; their files are imported at the first use."""
         return self._read("procedure", catalog.find())
 
     @cached_property
     def methods(self) -> Mapping[str, AnyMethod]:
-        """Every method by name, read when it is first wanted."""
+        """All methods by name; their files are imported at the first use."""
         return self._read("method", methods.find())
 
     def procedure(self, name: str) -> AnyProcedure:
@@ -67,11 +69,13 @@ class Catalogue:
         return {name: entry.title for name, entry in (*self.methods.items(), *self.procedures.items())}
 
     def notes(self) -> tuple[str, ...]:
-        """A sentence for each file that was left out so far."""
+        """Return a sentence for each file that was left out so far."""
         return tuple(self._left_out.values())
 
     def report(self, result: StoredResult) -> Report:
-        """Lay out a stored result for a person: tables and figures."""
+        """Return a stored result laid out for a person: tables and figures. Where its procedure is gone, a report that
+        says so.
+        """
         try:
             entry = self._required(result.kind, result.name)
         except NotFound:

@@ -4,14 +4,13 @@ Knows how samples become bytes and come back bit for bit. Must not know where th
 
 Counts of a unit at rest are near-constant plus noise, so int32 columns are delta-encoded (miniblocks as narrow as
 the noise) and then zstd; float64 columns are split into byte streams, so that equal exponents lie side by side.
+Arrow is imported where a chunk is encoded or decoded: a service that starts does without.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from procedures.core.recording import RawArray
 
@@ -26,7 +25,7 @@ ENCODINGS = {"int32": "DELTA_BINARY_PACKED", "float64": "BYTE_STREAM_SPLIT"}
 
 
 class UnreadableChunk(Exception):
-    """The payload is not the requested chunk."""
+    """Raised where the payload is not the requested chunk, or cannot be decoded."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,10 @@ def rows_per_chunk(channels: int, dtype: SampleType) -> int:
 
 
 def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> bytes:
-    """Encode samples, shape (n, channels), as Parquet with one column for each channel."""
+    """Return samples, shape (n, channels), as the bytes of a Parquet file with one column for each channel."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     encoding = ENCODINGS[samples.dtype.name]
     schema = pa.schema(
         [pa.field(name, pa.from_numpy_dtype(samples.dtype), nullable=False) for name in names],
@@ -73,7 +75,10 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
 
 
 def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
-    """Decode the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
+    """Return the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     try:
         table = pq.ParquetFile(pa.BufferReader(payload)).read(columns=list(names), use_threads=False)
         columns = [table.column(name).to_numpy() for name in names]

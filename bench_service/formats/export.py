@@ -9,7 +9,6 @@ import io
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -18,29 +17,10 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from bench_service.formats.chunk import RAW_BYTES, sample_type
+from bench_service.formats.export_format import ExportFormat
 from bench_service.formats.outbox import Outbox
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
-
-
-class ExportFormat(StrEnum):
-    """File format of an exported recording."""
-
-    ARROW = "arrow"
-    PARQUET = "parquet"
-    CSV = "csv"
-    NPY = "npy"
-
-    @property
-    def media_type(self) -> str:
-        """Return the format's media type for HTTP."""
-        return {
-            "arrow": "application/vnd.apache.arrow.stream",
-            "parquet": "application/vnd.apache.parquet",
-            "csv": "text/csv; charset=utf-8",
-            "npy": "application/octet-stream",
-        }[self.value]
-
 
 HELD = {ExportFormat.ARROW: 4, ExportFormat.PARQUET: 5, ExportFormat.CSV: 8, ExportFormat.NPY: 4}
 """Times a chunk's raw bytes that an export of it holds: as read, as columns, and as text or as a page of the file."""
@@ -65,7 +45,8 @@ def extract(
     start_s: float | None = None,
     stop_s: float | None = None,
 ) -> Extract:
-    """Select a part by names and by time since the first sample [s]; a sample belongs to its beginning.
+    """Return a part of a recording, by names of channels and by time since its first sample [s]; a sample belongs to
+    its beginning.
 
     Raises `MissingChannel`, `BadParameter`.
     """
@@ -104,7 +85,7 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
 
 
 def describe(part: Extract) -> dict[str, str]:
-    """Describe the recording for the reader of the file, as text."""
+    """Return the description of the recording for the reader of the file, as name -> text."""
     info = part.info
     return {
         "recording": info.id,

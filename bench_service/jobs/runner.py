@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class StepOutcome:
-    """A step's outcome for the workflow; small, because the engine stores it."""
+    """Outcome of a job's step for the workflow; small, because the engine stores it."""
 
     failure: Failure | None = None
     cancelled: bool = False
@@ -50,7 +50,7 @@ class StepOutcome:
 
 
 class JobRunner:
-    """Runs the steps of jobs on one bench, one job at a time."""
+    """Runs the steps of jobs on the bench of this process, one job at a time; the job engine calls it."""
 
     def __init__(
         self,
@@ -85,13 +85,13 @@ class JobRunner:
         self._ending = Event()
 
     def claim(self, entry: QueueEntry) -> Job | None:
-        """Claim a queued job, with its unit's current data; None where it cannot begin any more."""
+        """Claim a queued job, with its unit's current data, and return it; None where it cannot begin any more."""
         job = self._stores.jobs.get(entry.id)
         context = self._planner.refreshed(context_of(job, self._stores.calibrations.several))
         return self._stores.queue.claim(entry, context_document(context), now())
 
     def stations(self, job_id: str, attempt: int) -> int:
-        """Number of a claimed job's stations; with 0 stations nothing moves.
+        """Return the number of a claimed job's stations; with 0 stations nothing moves.
 
         -1 where there is nothing to do: the job has ended, is paused, or was requeued since.
         """
@@ -162,9 +162,8 @@ class JobRunner:
         return StepOutcome()
 
     def stop_now(self) -> None:
-        """Leave the running job's station and make the bench safe, also while the job's own thread hangs.
-
-        Called by the stop guard. The job's end is noted by its own thread, as soon as possible.
+        """Leave the running job's station and make the bench safe, also while the job's own thread hangs. Called by the
+        stop guard; the job's end is noted by its own thread, as soon as possible.
         """
         session = self._session
         if session is None:
@@ -184,7 +183,9 @@ class JobRunner:
         return whole_road(session, self._driver, self._by, given_back)
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result and its calibrations, and end the job with the verdict; may be repeated."""
+        """Analyse the recordings, store the result and its calibrations, and end the job with the verdict; may be
+        repeated.
+        """
         job = self._stores.jobs.get(job_id)
         if job.state is not JobState.RUNNING:  # a crash came after its end was stored, or another attempt has begun
             return StepOutcome()
@@ -224,7 +225,7 @@ class JobRunner:
         return self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
 
     def shut_down(self) -> None:
-        """Leave the running job to the next start, and the bench safe: the service is ending."""
+        """Have the session of the running job leave its station and make the bench safe: the service is ending."""
         self._ending.set()
         session = self._session
         if session is not None:
@@ -235,7 +236,7 @@ class JobRunner:
             self._spread.done()
 
     def running_job(self) -> Job | None:
-        """The job that drives the bench now."""
+        """Return the job whose session is open on the bench in this process; None where there is none."""
         session = self._session  # which another thread may close this moment
         return None if session is None else self._stores.jobs.get(session.job.id)
 

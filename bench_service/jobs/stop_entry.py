@@ -23,7 +23,8 @@ log = logging.getLogger(__name__)
 
 
 class StopEntry:
-    """Enters stops into the database.
+    """Enters a stop of the stop channel into the database: the stop, the cancellation of the running job, an audit
+    entry.
 
     Several processes enter the same stop, and each repeats it from the beginning where the database fails in between.
     So each part changes nothing where it was done before, and none is left out because an earlier one was done.

@@ -16,14 +16,14 @@ MOST = 1000
 
 @dataclass
 class KeyedStop:
-    """The stop request of one key, and whether it was answered."""
+    """The stop request of one idempotency key, and whether it was answered."""
 
     word: StopWord
     answered: bool = False
 
 
 class StopKeys:
-    """The stop requests of the latest keys. For any thread."""
+    """The stop requests of the latest idempotency keys, in the memory of this process. For any thread."""
 
     def __init__(self) -> None:
         self._mutex = Lock()

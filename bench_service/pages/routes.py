@@ -3,7 +3,7 @@
 from contextlib import suppress
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.formats.calibration_exports.forms import CalibrationForm
@@ -14,6 +14,7 @@ from bench_service.model.records import StoredResult
 from bench_service.pages.corrections import correction_table
 from bench_service.pages.images import SHELF
 from bench_service.pages.rendering import service_of, templates
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
@@ -21,7 +22,7 @@ from procedures.core.report import Figure
 from procedures.core.unit import Unit
 from procedures.core.units import DISPLAY, NOISE_DISPLAY
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 SHOWN_EVENTS = 300
 """Number of a job's latest events that its page lists."""
@@ -125,7 +126,7 @@ def _notes(events: tuple[Event, ...]) -> list[dict[str, Any]]:
 
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
-    """Page of the benches, their units and the latest jobs."""
+    """Return the HTML page of the benches, their units and the latest jobs."""
     service = service_of(request)
     queued = service.stores.queue.lengths()
     units = service.stores.units.units()
@@ -152,7 +153,9 @@ def home(request: Request) -> HTMLResponse:
 
 @router.get("/jobs/{job_id}")
 def job_page(job_id: str, request: Request) -> HTMLResponse:
-    """Page of a job: progress, stations, recordings, and its result once there is one."""
+    """Return the HTML page of a job: progress, stations, recordings, and its result once there is one. Raises
+    `NotFound`.
+    """
     service = service_of(request)
     job_id = job_id_of(service.stores, job_id)
     last_event, _ = service.stores.jobs.last_event(job_id)  # before the job: what comes later reloads the page
@@ -183,7 +186,7 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/results/{result_id}")
 def result_page(result_id: str, request: Request) -> HTMLResponse:
-    """Page of a result: verdict, checks, tables, plots, lineage."""
+    """Return the HTML page of a result: verdict, checks, tables, plots, lineage. Raises `NotFound`."""
     service = service_of(request)
     result = service.stores.results.get(result_id)
     numbers = service.stores.jobs.numbers([result.job_id] if result.job_id else [])
@@ -192,7 +195,7 @@ def result_page(result_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/units/{serial}")
 def unit_page(serial: str, request: Request) -> HTMLResponse:
-    """Page of a unit: its record, its calibrations and its correction sets."""
+    """Return the HTML page of a unit: its record, its calibrations and its correction sets. Raises `NotFound`."""
     service = service_of(request)
     unit = service.stores.units.unit(serial)
     return _page(

@@ -65,6 +65,7 @@ def test_the_form_follows_the_schema_and_the_preview_follows_the_form(window: Wa
     job = ended(service, job_in(page))
     assert job["requested_parameters"] == FAST
     assert job["labels"] == {"shift": "night"}
+    expect(page.locator(".verdict")).to_be_visible()  # the page of the job has loaded itself anew
     page.goto(f"{window.address}/start?from={job['id']}")
     expect(page.get_by_label("Dwell, s", exact=True)).to_have_value("5")
 
@@ -167,7 +168,7 @@ def test_estimates_so_far_are_drawn_while_a_job_runs(window: Watched, service: B
     expect(page.locator("#estimates")).to_contain_text("Allan deviation so far", timeout=30_000)
     expect(page.locator("#estimates .uplot").first).to_be_visible()
     expect(page.locator("#estimates")).to_contain_text("gyro_x")
-    expect(page.locator("#estimates")).to_contain_text("Uncertainty after each station", timeout=30_000)
+    expect(page.locator("#estimates")).to_contain_text("Uncertainty after each station", timeout=80_000)
     service.client.post(f"/api/v1/jobs/{job}/cancel")
 
 

@@ -188,7 +188,7 @@ def test_a_batch_is_started_from_a_search_followed_and_asked_for_its_failures(
     page.get_by_role("button", name="Run the method").click()
     expect(page.locator("#refusal")).to_contain_text("The batch is queued")
     batch = page.locator("#batches tr[data-batch]").first
-    expect(batch).to_contain_text("12 of 12", timeout=60_000)
+    expect(batch).to_contain_text("12 of 12", timeout=100_000)
     expect(batch).to_contain_text(f"Job {calibrated}")
     expect(batch.locator(".badge")).to_have_text("succeeded")
     batch.get_by_text("Results and failures").click()
@@ -200,7 +200,7 @@ def test_a_batch_is_started_from_a_search_followed_and_asked_for_its_failures(
     page.locator("#method").select_option("noise_analysis")
     page.get_by_role("button", name="Run the method").click()
     short = page.locator("#batches tr[data-batch]").first
-    expect(short).to_contain_text("1 of 1", timeout=60_000)
+    expect(short).to_contain_text("1 of 1", timeout=100_000)
     expect(short.locator(".badge")).to_have_text("failed")
     short.get_by_text("Results and failures").click()
     expect(short).to_contain_text("too few for a noise analysis")
@@ -222,7 +222,7 @@ def test_a_batch_takes_what_the_last_search_shows_and_a_job_by_its_number(
     page.locator("#each").select_option("recording")
     page.get_by_role("button", name="Run the method").click()
     batch = page.locator("#batches tr[data-batch]").first
-    expect(batch).to_contain_text(f"{count} of {count}", timeout=60_000)
+    expect(batch).to_contain_text(f"{count} of {count}", timeout=100_000)
     expect(batch).to_contain_text(f"Job {calibrated}")
 
 

@@ -222,6 +222,10 @@ def test_corrections_are_listed_and_decided(bench: Bench, address: str) -> None:
         assert bench(*entry, "--set", f"axes={json.dumps([axis] * 3)}", "--unit", "SIM-0001").code == 0
     new, old = bench("corrections", "SIM-0001", "--kind", "thermal", "--json").json()
     assert (new["current"], old["current"]) == (False, False), "a method's correction counts when a person says so"
+    assert (
+        f"correction {new['id']} of the kind 'thermal' comes from a second analysis"
+        in bench("corrections", "SIM-0001").out
+    )
     chosen = bench("correction", "choose", "SIM-0001", old["id"], "--by", "Ann", "--remark", "the passport's", "--json")
     assert chosen.json()["current"] is True
     assert [(d["act"], d["by"], d["remark"]) for d in chosen.json()["decisions"]] == [

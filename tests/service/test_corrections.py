@@ -65,10 +65,14 @@ def test_one_of_a_failed_result_is_chosen_with_a_remark(client: Client, database
     try:
         one = stores.results.get(made[0]["result"])
         failed = type(one)(**{**vars(one), "id": f"{one.id}-failed", "verdict": Verdict.FAIL})
-        stores.results.add(failed, by_rule=False, corrections=[gyros(3)])
+        stores.results.add(failed, corrections=[gyros(3)])
     finally:
         database.dispose()
     (stored,) = client.http.get(f"{UNIT}/corrections", params={"kind": "gyros"}).json()["items"]
+    assert (stored["current"], stored["verdict"]) == (False, "fail"), "a failed one never counts by itself"
+    assert f"result {failed.id}, whose verdict is fail" in stored["not_current"]
+    assert f"result {failed.id}, whose verdict is fail" in page(client, "/units/SIM-0001").words
+    assert client.http.get(UNIT).json()["gyro_correction"] is None
     refused = client.http.post(f"{UNIT}/corrections/{stored['id']}/current")
     assert (refused.status_code, refused.headers["content-type"]) == (409, "application/problem+json")
     assert "give a remark" in refused.json()["detail"]

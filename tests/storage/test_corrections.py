@@ -70,6 +70,30 @@ def test_one_of_a_result_that_did_not_pass_is_chosen_with_a_remark(
     assert stores.corrections.make_current("U-1", good.id, Decider("Bo")).current
 
 
+@pytest.mark.parametrize("verdict", [Verdict.FAIL, Verdict.ERROR])
+def test_one_of_a_job_that_did_not_pass_never_becomes_current_by_itself(
+    stores: Stores, new_result: NewResult, verdict: Verdict
+) -> None:
+    stores.units.put_unit(Unit("U-1", 100.0, CHANNELS))
+    alone = stores.results.add(new_result(verdict=verdict), corrections=[thermal(1), thermometers(1)])
+    assert not any(c.current for c in stores.corrections.list("U-1").items)
+    assert stores.units.unit("U-1").thermal_correction is None
+    stores.results.add(new_result(), corrections=[thermal(2)])
+    stores.results.add(new_result(verdict=verdict), corrections=[thermal(3)])
+    failed, good, first = stores.corrections.list("U-1", kind="thermal").items
+    assert [c.current for c in (failed, good, first)] == [False, True, False], "a failed one takes nobody's place"
+    assert (first.result_id, first.verdict, good.verdict) == (alone.id, verdict, Verdict.PASS)
+    assert good.why_not_current == ""
+    assert f"result {alone.id}, whose verdict is {verdict}" in first.why_not_current
+    chosen = stores.corrections.make_current("U-1", failed.id, ANN)
+    assert (chosen.current, chosen.why_not_current) == (True, "")
+    stores.results.add(new_result(), by_rule=False, corrections=[thermal(4)])
+    analysed = stores.corrections.list("U-1", kind="thermal").items[0]
+    assert "second analysis or a method" in analysed.why_not_current
+    stores.corrections.make_current("U-1", good.id, ANN)
+    assert "another one has taken its place" in stores.corrections.get("U-1", failed.id).why_not_current
+
+
 def test_a_person_chooses_which_one_is_current(stores: Stores, new_result: NewResult) -> None:
     for seed in (1, 2):
         stores.results.add(new_result(), corrections=[thermal(seed), converter(seed)])

@@ -89,5 +89,7 @@ RIGHTS: dict[str, Right] = {
 
 
 def right_of(name: str, method: str) -> Right:
-    """The right that a route needs."""
+    """Return the right that a route needs, by its name; one that is not listed needs `SEE` for reading, `ADMIN` for
+    anything else.
+    """
     return RIGHTS.get(name, Right.SEE if method in READING else Right.ADMIN)

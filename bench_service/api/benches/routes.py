@@ -1,6 +1,5 @@
 """Routes of benches: descriptions, current state, queues and software stops."""
 
-from fastapi import APIRouter
 from fastapi.exceptions import RequestValidationError
 
 from bench_service.api.access.teams import TeamOfBench
@@ -29,14 +28,15 @@ from bench_service.api.http.dependencies import (
 )
 from bench_service.api.http.errors import problems
 from bench_service.model.records import reasons_of
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from bench_service.wall_clock import now
 
-router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
+router = Routes(prefix="/api/v1/benches", tags=["benches"])
 
 
 def view_of(service: BenchService, bench_id: str) -> BenchView:
-    """Build the view of a bench: what it is, what it does, how safe it is. Raises `NotFound`."""
+    """Return the view of a bench: description, live state, safety, running job, queue. Raises `NotFound`."""
     description = service.benches.description(bench_id)
     running = service.jobs.driving_job(bench_id)
     live = service.live.of_bench(bench_id)

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import Response
 from pydantic import Field
 
 from bench_service.api.access.teams import TeamOfSchedule
@@ -13,8 +13,9 @@ from bench_service.api.http.fields import NAME, Labels, Request
 from bench_service.campaigns.schedule import Missed, Overlap
 from bench_service.campaigns.scheduler import ScheduleRequest
 from bench_service.mapping import copied
+from bench_service.routing import Routes
 
-router = APIRouter(prefix="/api/v1/schedules", tags=["campaigns"])
+router = Routes(prefix="/api/v1/schedules", tags=["campaigns"])
 OF_A_SCHEDULE = ("read_schedule", "change_schedule", "remove_schedule")
 
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Response
+from fastapi import Path, Response
 
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import problems
@@ -18,10 +18,11 @@ from bench_service.api.units.schemas import (
 )
 from bench_service.evidence.imports import require_real
 from bench_service.model.records import Idempotency
+from bench_service.routing import Routes
 from procedures.core.unit import SERIAL, Unit
 from procedures.core.unit_correction import CorrectionKind
 
-router = APIRouter(prefix="/api/v1/units", tags=["units"])
+router = Routes(prefix="/api/v1/units", tags=["units"])
 Serial = Annotated[str, Path(pattern=SERIAL)]
 
 

@@ -12,7 +12,9 @@ REASON, BY = 500, 100
 
 @dataclass(frozen=True)
 class StopWord:
-    """One person's stop request: reason, person, time, and the way over which it came."""
+    """One person's stop request as the stop channel holds it: id, reason, person, time, and the route over which it
+    came.
+    """
 
     reason: str
     by: str
@@ -54,7 +56,9 @@ DAMAGED = StopWord("a record of the stop channel cannot be read", "the stop chan
 
 @dataclass(frozen=True)
 class StopAnswer:
-    """The worker's or supervisor's progress with the stop requests so far."""
+    """Progress of the worker or supervisor with the stop requests: ids of those that it has seen, and of those after
+    which the bench was safe.
+    """
 
     by: str = ""
     seen: frozenset[str] = frozenset()

@@ -14,7 +14,7 @@ PAGE = 500
 
 
 def everything(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
-    """Read every page of a list."""
+    """Return all items of a list of the service, read page by page. Raises `Refused`."""
     items: list[dict[str, Any]] = []
     query: dict[str, Any] = {"limit": PAGE}
     while True:
@@ -26,7 +26,9 @@ def everything(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
 
 
 def newest(client: "httpx.Client", path: str, most: int, conditions: dict[str, Any]) -> dict[str, Any]:
-    """Read the newest items of a list that fulfil the conditions, as one page of any length; None is no condition."""
+    """Return the newest items of a list that fulfil the conditions, as one page of any length; None is no condition.
+    Raises `Refused`.
+    """
     query = {name: value for name, value in conditions.items() if value not in (None, [], "")}
     items: list[dict[str, Any]] = []
     while True:

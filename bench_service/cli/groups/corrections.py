@@ -18,7 +18,7 @@ def _table(items: list[dict[str, Any]]) -> "Table":
 
 
 correction = typer.Typer(no_args_is_help=True, help="A unit's current corrections: choose, approve, reject.")
-RECORDS = UnitRecords("correction", ("id", "kind", "current", "approval", "unusable"), _table)
+RECORDS = UnitRecords("correction", ("id", "kind", "current", "verdict", "approval", "unusable", "not_current"), _table)
 
 
 def corrections(
@@ -31,7 +31,7 @@ def corrections(
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """List a unit's corrections, newest first; at most one of each kind is current."""
+    """List a unit's corrections, newest first; at most one of each kind is current, and the others say why not."""
     RECORDS.print_newest(context, unit, {"limit": limit, "kind": kind}, server, as_json)
 
 

@@ -89,7 +89,7 @@ def _queued(job: dict[str, Any], server: str | None, as_json: bool) -> None:
 
 
 def follow(client: "httpx.Client", job: dict[str, Any], server: str | None, as_json: bool) -> int:
-    """Watch a job to its end, print what came out, and return the exit code of its verdict.
+    """Watch a job to its end, print its result, and return the exit code of its verdict.
 
     Ctrl-C: a job of a service continues there; one that this process drives is paused.
     """

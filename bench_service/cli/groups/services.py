@@ -50,12 +50,14 @@ def demo(
     """Start the service, calibrate and verify the simulated unit through it, show what came out, keep serving."""
     from bench_service.cli.demo import demonstrate
     from bench_service.cli.processes.companion import accompanied
+    from bench_service.cli.processes.ending import ending_like_ctrl_c
     from bench_service.cli.processes.serving import check_port, serving
 
     settings = _with(context.obj, port=port)
     check_port(settings)
     address = f"http://{settings.host}:{settings.port}"
     with (
+        ending_like_ctrl_c(),
         serving(settings),
         accompanied(settings, lambda: True),
         connect(settings, address, drive=False) as client,

@@ -31,7 +31,9 @@ SAFE, NOT_SAFE, REFUSED = 0, 1, 2
 
 
 def stop_here(bench: str, folder: Path, reason: str, wait_s: float, say: Callable[[str], object]) -> int:
-    """Stop a bench whose devices are in a folder; the exit code: 0 safe, 1 not within `wait_s`, 2 not asked for."""
+    """Stop a bench whose device files are in a folder, wait, and return the exit code: 0 safe, 1 not within `wait_s`, 2
+    not asked for.
+    """
     channel = StopChannel(folder, bench)
     word = StopWord(reason, _person(), "command")
     asked_s = monotonic_s()

@@ -25,7 +25,9 @@ from procedures.bench.errors import BenchError, DeviceBusy, DeviceFault
 
 
 def unsafe_devices(state: DeviceState | None) -> frozenset[str]:
-    """Devices that the register has as unsafe; all where it knows nothing, or only that something failed."""
+    """Return the names of the devices that the register has as unsafe; all where it knows nothing, or only that
+    something failed.
+    """
     if state is None:
         return frozenset(SAFE_ORDER)
     conditions = {
@@ -39,14 +41,16 @@ def unsafe_devices(state: DeviceState | None) -> frozenset[str]:
 
 
 def safe_state(kind: str, section: DeviceSection | None, state: DeviceState) -> dict[str, Any]:
-    """Changes of the register once a device was made safe, by the policy of its section."""
+    """Return the fields of the register that change once a device was made safe, by the policy of its section."""
     if isinstance(section, ChamberSection) and section.on_safe != "ambient":
         return {"chamber_target_c": None}
     return SAFE_STATE[kind](state)
 
 
 class WiredDevices:
-    """The devices of a bench file on this host."""
+    """The real devices of a bench file on this host, without a job. Implements
+    `bench_service.bench.devices.BenchDevices`.
+    """
 
     def __init__(self, read: Callable[[], BenchFile], register: DeviceRegister) -> None:
         """Set up; `read`: returns the bench file, or raises `Misconfigured`, when devices are first reached."""
@@ -69,7 +73,9 @@ class WiredDevices:
         return self._register.read()
 
     def compare(self, by: str) -> tuple[str, ...]:
-        """Compare the real devices with the register, which then takes over what they say; see the port."""
+        """Connect to the real devices and return sentences about what differs from the register, which then takes over
+        what they say.
+        """
         state, file = self._register.read(), self._file
         kinds: list[Kind] = [kind for kind in SAFE if kind in file.real()]
         if state is None or not kinds:

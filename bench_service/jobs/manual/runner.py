@@ -12,6 +12,7 @@ from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import RoadEnd, over_new_link, whole_road
 from bench_service.bench.processes import ProcessIdentity
+from bench_service.bench.worker_patience import ENDING_S
 from bench_service.jobs.manual.reader import LeaseReader
 from bench_service.jobs.manual.session import TIME_OVER, ManualSession
 from bench_service.jobs.stores import JobStores
@@ -23,8 +24,6 @@ from bench_service.wall_clock import now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
 
-END_S = 20.0
-"""Time that a service which ends waits for a bench in manual mode to be safe [s]."""
 WRITE_S = 2.0
 """Time that the end of a lease waits for its last outcomes to be written [s]."""
 
@@ -32,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 class ManualRunner:
-    """Runs one lease at a time."""
+    """Runs leases of manual mode on the bench of this process, one at a time; the dispatcher calls it."""
 
     def __init__(
         self,
@@ -41,8 +40,13 @@ class ManualRunner:
         driver: BenchDriver,
         board: LiveBoard,
         stopped: Callable[[], bool] = lambda: False,
+        ending_s: float = ENDING_S,
     ) -> None:
-        """Set up with `stopped`: whether the bench is stopped over its host's stop channel; asks no database."""
+        """Set up with `stopped`: whether the bench is stopped over its host's stop channel; asks no database.
+
+        `ending_s`: time that a service which ends waits for a bench in manual mode to be safe [s].
+        """
+        self._ending_s = ending_s
         self._stores, self._trail, self._driver, self._board = stores, trail, driver, board
         self._stopped = stopped
         self._by = f"the worker, {ProcessIdentity.own()}"
@@ -80,7 +84,7 @@ class ManualRunner:
         return True
 
     def wake(self) -> None:
-        """Look at the lease now: a demand came, or its end was asked for."""
+        """Have the lease read now, because a demand came or its end was requested; never waits."""
         self._wake.set()
 
     def stop_now(self) -> None:
@@ -100,7 +104,7 @@ class ManualRunner:
         session = self._session
         if session is not None:
             session.shut_down()
-        self._idle.wait(END_S)
+        self._idle.wait(self._ending_s)
 
     def _hold(self, lease: ManualLease) -> None:
         description = self._driver.description

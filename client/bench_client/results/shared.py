@@ -264,7 +264,9 @@ class TriadSummary(Part):
     left_out: Magnitudes | None = None
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
     suspect: str = ""
-    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
+    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared.
+    `triad_analysis.suspected` finds it from all triads of the same stations.
+    """
     budgets: tuple[Budget, ...] = ()
     """Uncertainty budget of each coefficient; empty in results of older versions."""
 

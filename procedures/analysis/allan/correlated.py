@@ -82,7 +82,9 @@ class SharedProducts:
 
 
 class CorrelatedSums:
-    """Sums of an overlapping member for many cluster sizes, from samples less a constant; no gaps."""
+    """Sums of squared differences of one overlapping statistic at many cluster sizes, from samples without gaps from
+    which a constant (their mean, about) was taken. The fast method, for long series.
+    """
 
     def __init__(self, statistic: Statistic, count: int, sizes: Sizes, shared: SharedProducts | None = None) -> None:
         """`shared`: of several members, which are then fed through it, once."""
@@ -97,7 +99,9 @@ class CorrelatedSums:
         self._shared.add(y)
 
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
-        """Sums and numbers of terms at `sizes`, (k,) each, after the last sample. Raises `Uncorrelatable`."""
+        """Sums of squared differences and their term counts, (k,) each, at `self.sizes` (not the sizes asked for: see
+        `snapped`). Call once, after the last sample. Raises `Uncorrelatable` where the fast method loses accuracy.
+        """
         products = self._shared.products
         near = padded_sums(products, self._statistic, self._near)
         near -= edge_sums(self._shared.head, self._shared.tail, self._near, self._span, self._squares)

@@ -138,7 +138,9 @@ class OverlappingSums:
         return sum_of_squares(x, missing, m, p, stop)
 
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
-        """Sums and numbers of terms at `sizes`, (k,) each, after the last piece."""
+        """Sums of squared differences and their term counts, (k,) each, at `self.sizes`. Call once, after the last
+        piece.
+        """
         if len(self._near):
             self._difference(slice(None), None)
         points, gaps = self._points.x, self._points.missing

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, ndtri, ndtri_exp
-from scipy.stats import chi2
 
 from procedures.analysis.calibration.table_errors import TableErrors
 from procedures.analysis.least_squares.chi_square import tail_probability
@@ -187,6 +186,8 @@ def _change(
 
 def _as_sigmas(statistic: float, degrees: int) -> float:
     """Normal deviation as likely, two-sided, as a chi-square so large; not past what doubles can tell apart."""
+    from scipy.stats import chi2  # with all of scipy's statistics: only where it is called
+
     if degrees == 0:
         return 0.0
     if degrees == 1:

@@ -10,7 +10,6 @@ from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.misfit import residual_misfit
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
-from procedures.analysis.calibration.suspect_flaw import suspect
 from procedures.analysis.calibration.verification import Magnitudes
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, coefficient_unit
@@ -84,7 +83,10 @@ class TriadSummary:
     left_out: Magnitudes | None = None
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
     suspect: str = ""
-    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
+    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared.
+
+    `triad_analysis.suspected` finds it from all triads of the same stations.
+    """
     budgets: tuple[Budget, ...] = ()
     """Uncertainty budget of each coefficient; empty in results of older versions."""
 
@@ -122,7 +124,6 @@ def triad_summary(
         misfit.ratio,
         misfit.worst,
         left_out,
-        "" if fit.free is None else suspect(fit.free, labels),
     )
 
 

@@ -78,12 +78,13 @@ def ferraris_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableError
     return replace(made, sd=sd)
 
 
-def ferraris_estimator(
-    motion: Turning, noise: Array | None, uncertainty: TableUncertainty, matrix: Array
-) -> TurnEstimator:
-    """Estimator of b and K over rests and turns; `noise` (3, n, n) of the station means. Raises `Undetermined`."""
+def ferraris_estimator(motion: Turning, noise: Array | None, flaws: TableErrors, matrix: Array) -> TurnEstimator:
+    """Estimator of b and K over rests and turns; `noise` (3, n, n) of the station means. Raises `Undetermined`.
+
+    `flaws`: those of the table on this motion (`ferraris_flaws`).
+    """
     slopes = motion.axis_b @ matrix.T
-    return turn_estimator(motion, slopes, (), units.DEG, noise, ferraris_flaws(motion, uncertainty), matrix)
+    return turn_estimator(motion, slopes, (), units.DEG, noise, flaws, matrix)
 
 
 def analyse_ferraris(
@@ -101,11 +102,12 @@ def analyse_ferraris(
     labels = [label for label, turned in zip(means.labels, turns, strict=True) if turned]
     require_turns(only(motion, turns), outputs[turns], labels)
     noise = triad_covariance(record, means.windows)
-    first = ferraris_estimator(motion, None, uncertainty, np.eye(3))
+    flaws = ferraris_flaws(motion, uncertainty)
+    first = ferraris_estimator(motion, None, flaws, np.eye(3))
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]
-    fit = fitted(ferraris_estimator(motion, noise, uncertainty, matrix), outputs, noise is not None)
+    fit = fitted(ferraris_estimator(motion, noise, flaws, matrix), outputs, noise is not None)
     found = whole_turns(fit, (), motion, outputs, np.flatnonzero(turns).tolist(), noise is not None)
-    return with_budgets(found, fit, record, means.windows, ferraris_flaws(motion, uncertainty))
+    return with_budgets(found, fit, record, means.windows, flaws)
 
 
 def faces_of(recordings: Sequence[Recording]) -> list[Station]:

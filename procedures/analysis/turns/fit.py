@@ -271,10 +271,12 @@ def fit_turns(
     terms: Sequence[Term],
     reference_rad_s: float,
     noise: Array | None,
-    uncertainty: TableUncertainty,
+    flaws: TableErrors,
 ) -> TurnFit:
-    """Fit integrated outputs (n, 3) [rad]; K and slopes for the weights come from plain least squares beforehand."""
-    flaws = turn_flaws(motion, uncertainty)
+    """Fit integrated outputs (n, 3) [rad]; K and slopes for the weights come from plain least squares beforehand.
+
+    `flaws`: those of the table on this motion (`turn_flaws`).
+    """
     slopes = outputs / motion.angle_rad[:, None]
     first = turn_estimator(motion, slopes, (), reference_rad_s, None, flaws, np.eye(3))
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]

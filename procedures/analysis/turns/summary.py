@@ -93,9 +93,10 @@ def analyse_turns(
     motion = as_turned(motion, recordings, site)
     noise = triad_covariance(record, means.windows)
     reference = reference_rate_deg_s * units.DEG
-    fit = fit_turns(motion, outputs, terms, reference, noise, uncertainty)
+    flaws = turn_flaws(motion, uncertainty)
+    fit = fit_turns(motion, outputs, terms, reference, noise, flaws)
     made = whole_turns(fit, terms, motion, outputs, range(len(outputs)), noise is not None)
-    made = with_budgets(made, fit, record, means.windows, turn_flaws(motion, uncertainty))
+    made = with_budgets(made, fit, record, means.windows, flaws)
     return replace(made, reference_rate_deg_s=reference_rate_deg_s)
 
 

@@ -27,12 +27,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Database":
-    """Open a ROS 2 bag. Raises `UnreadableFile`."""
+    """Return a reader of a ROS 2 bag in SQLite. Raises `UnreadableFile`."""
     return Database(stream, name)
 
 
 class Database:
-    """A bag in SQLite; one file of it, where it was split."""
+    """Reader of one ROS 2 bag in SQLite; of one file of it, where it was split. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name
@@ -78,11 +78,13 @@ class Database:
         return found
 
     def tables(self) -> list[LogTable]:
-        """List the topics as tables."""
+        """Return the topics that have messages as tables."""
         return [topic.table() for topic in self._topics.values() if topic.rows]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the messages of a topic as columns, in the order of arrival. Raises `UnreadableFile`."""
+        """Yield blocks of a topic's messages in the order of arrival: for each named column its values, (n,). Raises
+        `UnreadableFile`.
+        """
         number = next((n for n, topic in self._topics.items() if topic.name == table.name), None)
         if number is None:
             return

@@ -9,7 +9,7 @@ from bench_service.formats.errors import UnreadableFile
 
 
 def unpacked(data: Any, compression: str, size: int, name: str) -> Any:
-    """Unpack a chunk of `size` bytes: none, lz4, zstd or bz2. Raises `UnreadableFile`."""
+    """Return a chunk of `size` bytes unpacked: none, lz4, zstd or bz2. Raises `UnreadableFile`."""
     try:
         if compression in ("", "none"):
             return data
