@@ -41,7 +41,7 @@ class Overlap(StrEnum):
 
 @dataclass(frozen=True)
 class Schedule:
-"""A campaign that is run on a unit repeatedly, by a cron expression in a time zone, with its next and last
+    """A campaign that is run on a unit repeatedly, by a cron expression in a time zone, with its next and last
     start; or once, at the next start alone.
     """
 
