@@ -46,7 +46,8 @@ def schedule_table(items: list[dict[str, Any]]) -> Table:
     table = _table("schedule", "campaign", "unit", "cron", "zone", "next, UTC", "last outcome")
     for one in items:
         next_at = (one["next_at"] or "off")[:16].replace("T", " ")
-        row = (one["id"], one["campaign"], one["unit"], one["cron"], one["time_zone"], next_at)
+        times = ("once", "") if one.get("once") else (one["cron"], one["time_zone"])
+        row = (one["id"], one["campaign"], one["unit"], *times, next_at)
         table.add_row(*row, one["last_outcome"])
     return table
 
