@@ -16,13 +16,19 @@ class Quantity:
     value: float
     unit: str
     standard_uncertainty: float | None = None
+    bound: bool = False
+    """True: nothing was observed, and the value is what it stays below."""
 
 
 def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     """Every check and every named estimate (an entry with name, unit and estimate) of a document, by name."""
     found = {
         check["name"]: Quantity(
-            check["name"], check["value"], check["limit"]["unit"], check.get("standard_uncertainty")
+            check["name"],
+            check["value"],
+            check["limit"]["unit"],
+            check.get("standard_uncertainty"),
+            check.get("bound", False),
         )
         for check in document.get("checks", [])
     }
