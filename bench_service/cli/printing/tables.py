@@ -155,9 +155,18 @@ def recording_table(recordings: list[dict[str, Any]]) -> Table:
     return table
 
 
+def recording_line(recording: dict[str, Any]) -> str:
+    """A recording in one line: its id first."""
+    return (
+        f"recording {recording['id']} of unit {recording['unit']}: {recording['count']} samples of "
+        f"{len(recording['channels'])} channels, {recording['rate_hz']:.9g} Hz, {recording['duration_s']:.9g} s"
+    )
+
+
 def result_table(results: list[dict[str, Any]]) -> Table:
     """Table of results, newest first."""
     table = _table("result", "procedure or method", "unit", "verdict", "job", "made")
+    table.columns[4].no_wrap = True
     for one in results:
         job = one["lineage"]["job"] or "–"
         table.add_row(
