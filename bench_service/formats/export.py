@@ -78,6 +78,19 @@ def extract(
     return Extract(replace(info, channels=chosen), first, last, dtype)
 
 
+def require_samples(part: Extract, start_s: float | None, stop_s: float | None) -> None:
+    """Refuse a stretch in which no sample begins. Raises `BadParameter` with the range of the recording."""
+    info, begin_s = part.info, start_s or 0.0
+    if part.start < part.stop or info.count == 0:
+        return
+    field, given, end_s = ("start_s", begin_s, info.duration_s) if stop_s is None else ("stop_s", stop_s, stop_s)
+    allowed = (
+        f"a stretch with samples: of {info.rate_hz:g} a second none begins within {begin_s:g} … {end_s:g} s; start_s "
+        f"and stop_s count from the first sample, 0 … {info.duration_s:g}"
+    )
+    raise BadParameter(field, given, allowed)
+
+
 def _sample(info: RecordingInfo, field: str, moment_s: float) -> int:
     """The first sample that begins at a moment or after it."""
     if not 0.0 <= moment_s <= info.duration_s * (1 + 1e-12):

@@ -97,8 +97,8 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
 def in_run_unresolved(
     plan: TriadPlan, limit: float, display: str, display_size: float, *, in_sample: bool = False
 ) -> str | None:
-    """Return a warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI];
-    else None.
+    """Return a warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit
+    [SI]; else None.
 
     `in_sample`: of a calibration at its own stations, which follows a part of the noise.
     """
