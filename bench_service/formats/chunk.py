@@ -95,7 +95,7 @@ def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
     return out
 
 
-def arrow_array(values: NDArray[Any]) -> "pa.Array[Any]":
+def arrow_array(values: NDArray[Any]) -> Any:
     """Numbers as an Arrow array over the same memory, without missing values.
 
     `pyarrow.array` imports pandas wherever that is installed: half a second and 50 MB, for values of other kinds.

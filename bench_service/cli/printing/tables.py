@@ -59,11 +59,11 @@ def check_table(document: dict[str, Any]) -> Table:
         source = Text(limit.get("source", ""))
         value = f"{'< ' if check.get('bound') else ''}{check['value']:.4g}"
         table.add_row(check["name"], value, expanded, ", ".join(bounds), limit["unit"], source, outcome)
-    said: list[str] = []
+    ends: list[str] = []
     if (statement := document.get("statement")) is not None:
-        said = [f"{statement['outcome']}; decision rule: {statement['rule']}; U: expanded uncertainty"]
+        ends = [f"{statement['outcome']}; decision rule: {statement['rule']}; U: expanded uncertainty"]
     notes = [f"{check['name']}: {check['note']}" for check in document.get("checks", []) if check.get("note")]
-    table.caption = Text("\n".join([*said, *notes]))
+    table.caption = Text("\n".join([*ends, *notes]))
     return table
 
 
