@@ -9,15 +9,12 @@ Arrow is imported where a chunk is encoded or decoded: a service that starts doe
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from procedures.core.recording import RawArray
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 RAW_BYTES = 2 * 1024 * 1024
 """Raw size of a full chunk: the payload stays under a megabyte for noise up to 10 bits, and decodes in milliseconds."""
