@@ -36,7 +36,12 @@ from procedures.analysis.calibration.triad_verification import (
     verify_triad,
 )
 from procedures.analysis.calibration.verification import predicted_sd
-from procedures.analysis.orientation_plan.requirements import IN_RUN_LEVEL, in_run_check, in_run_unresolved
+from procedures.analysis.orientation_plan.requirements import (
+    IN_RUN_LEVEL,
+    chance_of_failure,
+    in_run_check,
+    in_run_unresolved,
+)
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -143,7 +148,7 @@ def predict(params: Params, context: Context) -> Prediction:
     uncertainties = tuple(u for plan in plans for u in (*_predicted(plan), *_predicted_changes(plan, params, context)))
     stations = schedule(params)
     duration_s = float(windows(expected_stations(stations), context.bench.axis_motion)[-1, 1])
-    warnings = _warnings(plans, params.limits) + params.dwell_warnings(stations)
+    warnings = _warnings(plans, params.limits) + _chances(plans, params.limits) + params.dwell_warnings(stations)
     return Prediction(duration_s, uncertainties, warnings, basis(plans) if uncertainties else "")
 
 
@@ -266,6 +271,13 @@ def _warnings(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
                 "only for the launch of the calibration"
             )
     return tuple(found)
+
+
+def _chances(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
+    """Sentences on limits that a sound unit may well exceed; one that the plan makes has its level."""
+    declared = (limits.gyro_bias_in_run_deg_h, limits.accelerometer_bias_in_run_m_s2)
+    found = [chance_of_failure(_in_run(p, limits)) for p, own in zip(plans, declared, strict=True) if own is not None]
+    return tuple(w for w in found if w is not None)
 
 
 def _in_run(plan: TriadPlan, limits: Limits) -> PlannedCheck:

@@ -7,7 +7,7 @@ from procedures.core.arrays import Array
 
 
 def magnitude_gradient(vectors: Array, correction: ArrayLike) -> Array:
-    """``∂|v̂|/∂U = K⁻ᵀ·v/|v|`` at vectors (n, 3) for the correction K⁻¹ (3, 3), shape (n, 3)."""
+    """Return ``∂|v̂|/∂U = K⁻ᵀ·v/|v|`` at vectors (n, 3) for the correction K⁻¹ (3, 3), shape (n, 3)."""
     return vectors / np.linalg.norm(vectors, axis=1)[:, None] @ np.asarray(correction, dtype=np.float64)
 
 
@@ -22,7 +22,7 @@ def in_sample_gain(gradient: Array, remaining: Array) -> Array:
 
 
 def magnitude_covariance(gradient: Array, covariance: Array) -> Array:
-    """Covariance (n, n) of magnitudes with gradient w (n, 3), for the channels' covariances (3, n, n).
+    """Return the covariance (n, n) of magnitudes with gradient w (n, 3), for the channels' covariances (3, n, n).
 
     ``Σ_c diag(w_c)·C_c·diag(w_c)``.
     """

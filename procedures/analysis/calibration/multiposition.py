@@ -73,11 +73,11 @@ class TriadFit:
 
     @property
     def p_value(self) -> float | None:
-        """Chance of a chi-square at least as large, where it can be judged."""
+        """Probability of a chi-square at least as large; None where it cannot be judged."""
         return judged_p_value(self.chi_square, self.degrees_of_freedom, self.noise_known)
 
     def calibration(self) -> TriadCalibration:
-        """The coefficients with their total covariance, ready to correct with."""
+        """Return the coefficients with their total covariance, as a calibration to correct with."""
         return triad_calibration(self.triad, self.output_unit, self.input_unit, self.coefficients, self.covariance)
 
 

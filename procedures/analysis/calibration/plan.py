@@ -44,7 +44,9 @@ class TriadPlan:
     """Scatter at other dwells than the planned one: several limits, and plans that differ in nothing else, share it."""
 
     def at_dwell(self, dwell_s: float | None = None) -> "AtDwell | None":
-        """Noise and estimator at the planned or another dwell; None for unknown noise. Raises `Undetermined`."""
+        """Return noise and estimator at the planned or another dwell [s]; None for unknown noise. Raises
+        `Undetermined`.
+        """
         if dwell_s is None:
             return self._planned
         noise = self.noise_covariance(dwell_s)
@@ -56,7 +58,7 @@ class TriadPlan:
         return None if noise is None else AtDwell(noise, self.estimator(noise))
 
     def scatter(self, dwell_s: float | None = None) -> "Scatter | None":
-        """Scatter between calibrations at a dwell; None for unknown noise. Raises `Undetermined`."""
+        """Return the scatter between calibrations at a dwell [s]; None for unknown noise. Raises `Undetermined`."""
         if dwell_s is None:
             return self._scatter(None)
         if dwell_s not in self.scatters:
@@ -73,16 +75,18 @@ class TriadPlan:
         return Scatter(np.diagonal(gls.noise_covariance), self.share(gls).standard_uncertainty("pointing"))
 
     def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
-        """Covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown noise."""
+        """Return the covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown
+        noise.
+        """
         return triad_covariance(self.unit.triad(self.triad), windows(self.stations, self.axes, dwell_s))
 
     def estimator(self, noise_covariance: Array) -> Estimator:
-        """The generalised least squares of this plan. Raises `Undetermined`."""
+        """Return the generalised least squares of this plan. Raises `Undetermined`."""
         flaws = self._of_outputs if self.weighting == "noise_and_table" else None
         return estimator(f"the {self.triad} coefficients", self.vectors, noise_covariance, flaws)
 
     def share(self, plan: Estimator) -> TableShare:
-        """Contribution of the table's flaws to the coefficients of this plan."""
+        """Return the contribution of the table's flaws to the coefficients of this plan."""
         return table_share(plan, self._of_outputs, self.table, self.matrix)
 
     @cached_property
@@ -115,7 +119,7 @@ def triad_plan(
     uncertainty: TableUncertainty,
     weighting: Weighting = "noise_and_table",
 ) -> TriadPlan:
-    """Plan of a triad at stations that all carry table angles."""
+    """Return the plan of a triad at stations that all carry table angles."""
     angles = [s.angles for s in stations if s.angles is not None]
     vectors, table = _geometry(triad, tuple(angles), site, uncertainty)
     known = unit.known_matrix(triad)
@@ -155,7 +159,7 @@ def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
 
 
 def parts_by_noise(plan: TriadPlan, noise_covariance: Array) -> tuple[Array, Array]:
-    """`predicted_parts` for a known covariance of the station means (3, n, n). Raises `Undetermined`."""
+    """Return `predicted_parts` for a known covariance of the station means (3, n, n). Raises `Undetermined`."""
     return _parts(plan, plan.estimator(noise_covariance))
 
 
@@ -179,7 +183,9 @@ def in_sample_covariance(plan: TriadPlan) -> Array | None:
 
 
 def basis(plans: Sequence[TriadPlan]) -> str:
-    """Basis of a unit's predicted uncertainties: its calibration, or its nominal scale factors."""
+    """Return the sentence on what a unit's predicted uncertainties rest on: its calibration, or its nominal scale
+    factors.
+    """
     nominal = [plan.triad for plan in plans if not plan.calibrated]
     if len(nominal) == len(plans):
         return "nominal scale factors: the unit has no calibration yet; uncertainties scale with the true ones"

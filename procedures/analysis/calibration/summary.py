@@ -62,7 +62,7 @@ class ScalarCheck:
 
 @dataclass(frozen=True)
 class TriadSummary:
-    """Complete calibration results of one triad."""
+    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets. JSON-ready."""
 
     calibration: TriadCalibration
     coefficients: tuple[Coefficient, ...]
@@ -101,7 +101,9 @@ def triad_summary(
     slow: float = 0.0,
     left_out: Magnitudes | None = None,
 ) -> TriadSummary:
-    """Numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not known."""
+    """Return the numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not
+    known.
+    """
     misfit = residual_misfit(fit.residuals, fit.residual_sd, fit.chi_square, fit.degrees_of_freedom, labels, slow)
     return TriadSummary(
         fit.calibration(),

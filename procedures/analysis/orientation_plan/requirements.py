@@ -1,9 +1,9 @@
-"""Limits on a calibration held against its plan: those that it cannot resolve, and the check of the bias in run."""
+"""Limits on a calibration compared with its plan: those that it cannot resolve, and the check of the bias in run."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
+from scipy.special import chdtrc, chdtri
 
 from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
 from procedures.analysis.calibration.plan import TriadPlan, in_sample_covariance
@@ -19,6 +19,8 @@ BIASES = (0, 4, 8)
 SCALE_FACTORS = (1, 6, 11)
 IN_RUN_SOURCE = "thesis 4.3, 5.1"
 IN_RUN_LEVEL = 0.001
+RARE = 0.01
+"""Chance that a sound unit fails a check, below which a plan does not mention it."""
 
 _TURNS = (
     "whole turns of the table at a known rate determine it instead (procedure scale_factor_whole_turns: ±n·360°, the "
@@ -45,7 +47,9 @@ def run_to_run_requirements(
     accelerometer_bias_m_s2: float,
     accelerometer_scale_ppm: float,
 ) -> tuple[Requirement, ...]:
-    """The limits on stability from launch to launch (thesis 4.3, 5.6); without that of the gyro scale where None."""
+    """Return the limits on stability from launch to launch (thesis 4.3, 5.6); without that of the gyro scale where
+    None.
+    """
     deg_h, ppm = units.DEG_PER_HOUR, units.PPM
     scale = () if gyro_scale_ppm is None else (gyro_scale_ppm * ppm,)
     return (
@@ -93,7 +97,8 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
 def in_run_unresolved(
     plan: TriadPlan, limit: float, display: str, display_size: float, *, in_sample: bool = False
 ) -> str | None:
-    """Warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI].
+    """Return a warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit
+    [SI]; else None.
 
     `in_sample`: of a calibration at its own stations, which follows a part of the noise.
     """
@@ -142,6 +147,31 @@ def in_run_check(
         field = f"limits.{plan.triad}_bias_in_run_{'deg_h' if plan.triad == 'gyro' else 'm_s2'}"
         raise BadParameter(field, None, "a number: the noise is not known, so the plan has no uncertainty to take")
     return PlannedCheck(name, limit, floor, freedom, 0.0, own)
+
+
+def sound_unit_fails(planned: PlannedCheck) -> float | None:
+    """Chance that a sound unit exceeds the limit of a root mean square; None where the plan does not predict it.
+
+    ``P(χ²_ν > ν·limit²/u²)`` with the u that the plan predicts and its effective degrees of freedom ν: an approximation
+    by two moments, good to about a percentage point (Satterthwaite). A sound unit's true value is zero.
+    """
+    u, freedom, limit = planned.standard_uncertainty, planned.degrees_of_freedom, planned.limit.maximum
+    if u is None or freedom is None or limit is None:
+        return None
+    return float(chdtrc(freedom, freedom * (limit / u) ** 2)) if u > 0.0 else 0.0
+
+
+def chance_of_failure(planned: PlannedCheck) -> str | None:
+    """Warning where a sound unit fails a planned check oftener than `RARE`, with the chance and what makes it."""
+    chance = sound_unit_fails(planned)
+    if chance is None or chance < RARE:
+        return None
+    limit = planned.limit
+    return (
+        f"{planned.check}: a sound unit exceeds the limit of {limit.maximum:g} {limit.unit} with a chance of about "
+        f"{100.0 * chance:.2g} %, for noise, the calibration's uncertainty and the unit's change between launches make "
+        f"about {planned.standard_uncertainty:.2g} {limit.unit}: such a FAIL alone is no fault of the unit"
+    )
 
 
 def _length(dwell_s: float) -> str:
