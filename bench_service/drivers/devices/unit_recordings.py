@@ -70,7 +70,7 @@ class UnitRecordings:
         return tuple(StatusWord(name, raw, bits) for name, raw, bits in self._stream.words())
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording with the next frame that comes; see the port."""
+        """Begin a recording with the first sample from now on; see the port."""
         if not 0.0 <= duration_s < float("inf"):
             raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")
         if not self._context.powered():
@@ -80,13 +80,14 @@ class UnitRecordings:
             raise OutOfRange("station.temperatures = True: the frames of this unit hold no temperature")
         columns = None if warm or len(self._inertial) == len(self._all) else self._inertial
         self._stream.begin()
-        tape = Tape(max(1, min(MOST_HELD, round(HELD_S * self.rate_hz * self._context.time_factor))))
+        real_rate_hz = self.rate_hz * self._context.time_factor
+        most = max(1, min(MOST_HELD, round(HELD_S * real_rate_hz)))
+        start_s = self._context.clock.now_s()
+        tape = Tape(most, wall_clock.monotonic_s(), 1.0 / real_rate_hz)
         self._stream.record(tape)
         samples = round(duration_s * self.rate_hz)
         blocks = self._blocks(tape, samples, columns)
-        return Stream(
-            self._all if warm else self.channels, self.rate_hz, self._context.clock.now_s(), blocks, station, None
-        )
+        return Stream(self._all if warm else self.channels, self.rate_hz, start_s, blocks, station, None)
 
     async def _blocks(self, tape: Tape, samples: int, columns: list[int] | None) -> AsyncIterator[NDArray[np.int32]]:
         try:
