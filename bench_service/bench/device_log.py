@@ -27,7 +27,7 @@ LEAST_S = 1.0
 AXES = ("outer", "middle", "inner")
 ROOM = ("temperature_c", "humidity_percent", "pressure_hpa")
 LEAST_TOLERANCE_DEG = 0.01
-"""Difference from the demand that is no fault of any table [deg]."""
+"""Smallest tolerance that any table gets [deg]."""
 SIGMAS = 10.0
 """Number of standard uncertainties of a commanded angle beyond which an encoder disagrees with the demand: by chance
 no table does so, and a wrong axis, a lost turn or a table that was turned by hand all do.
@@ -105,7 +105,9 @@ class DeviceLog:
         self._note(self._bench.imu.status())
 
     def measured(self) -> Measured:
-        """Means and spreads of the readings so far."""
+        """Return means and spreads of the readings so far: encoders, supply, room and status words; None for each
+        device of which no reading was taken.
+        """
         angles = supply = None
         if self._angles.count:
             mean, spread = TableAngles(*self._angles.mean), TableAngles(*self._angles.spread)
@@ -135,7 +137,9 @@ class DeviceLog:
 
 
 def made_by(description: BenchDescription) -> dict[str, Any]:
-    """Source of a recording: real, mixed or simulated, and device by device; empty where all are simulated."""
+    """Return the origin of a recording and of each device by its name, as the JSON that is stored with the recording;
+    empty where all devices are simulated.
+    """
     if not description.devices:
         return {}
     return {
@@ -148,7 +152,7 @@ def made_by(description: BenchDescription) -> dict[str, Any]:
 
 
 def tolerance_deg(accuracy: TableAccuracy) -> float:
-    """Largest difference of an encoder from its demand that is no fault [deg]."""
+    """Largest allowed |encoder - demand| of any axis [deg]: the greater of 0.01 deg and ten pointing uncertainties."""
     return max(LEAST_TOLERANCE_DEG, SIGMAS * accuracy.pointing_sd_arcsec / 3600.0)
 
 

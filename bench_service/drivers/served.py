@@ -1,4 +1,4 @@
-"""A bench file's devices as simulators that serve: the ports of its addresses, one world behind them."""
+"""A bench file's devices as simulators that listen on the file's addresses, with one simulated world behind them."""
 
 import tomllib
 from collections.abc import Callable

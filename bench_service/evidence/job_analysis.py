@@ -30,7 +30,9 @@ class Analysed:
 
 
 def recordings_of(stores: EvidenceStores, job_id: str) -> list[Recording]:
-    """A job's complete recordings for an analysis, in the order of their stations."""
+    """Return a job's complete recordings for an analysis, in the order of their stations; samples are read when they
+    are used.
+    """
     return [stores.recordings.load(stored.info.id) for stored in stores.recordings.of_job(job_id)]
 
 
@@ -42,9 +44,10 @@ def analysed(
     recordings: Sequence[Recording],
     code_version: str,
 ) -> Analysed:
-    """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters.
+    """Run a procedure's analysis on a job's recordings, and return the result, not stored yet.
 
-    A value that cannot be stored, NaN above all, is `UnfitResult`.
+    Raises `DomainError`, `ValidationError` for the parameters. A value that cannot be stored, NaN above all, is
+    `UnfitResult`.
     """
     if len(recordings) != len(job.stations):
         raise UnfitRecording(f"job {job.id} has {len(recordings)} of its {len(job.stations)} recordings")

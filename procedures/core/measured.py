@@ -1,4 +1,4 @@
-"""Readings of table and supply over a recording, beside what was commanded of them."""
+"""Readings of the devices while a recording was made, with which commanded values are compared."""
 
 from dataclasses import dataclass
 

@@ -72,7 +72,7 @@ async def _others() -> AsyncGenerator[dict[str, tuple[int, _Heard]]]:
 
 
 async def _refusal(driver: str, port: int, folder: Path) -> str:
-    """What the demand ends with. It must end in the words of a bench's error, within its deadline."""
+    """Return what the demand ends with. It must end in the words of a bench's error, within its deadline."""
     kind, section, demand = DRIVERS[driver]
     device = opened(kind, driver, port, folder, answer_s=0.3, connect_s=1.0, **section)
     try:

@@ -72,10 +72,31 @@ def judged_counts(series: Mapping[str, Sequence[int]]) -> list[str]:
     """Print counts by quarter, each by its name; return those that grow."""
     wrong: list[str] = []
     for name, counts in series.items():
-        quarters = np.array_split(np.array(counts), 4)
+        if not counts:
+            wrong.append(f"{name}: not determined: there is no sample of the service")
+            continue
+        quarters = np.array_split(np.array(counts), min(4, len(counts)))
         print(f"{name}: {', '.join(str(int(q.max())) for q in quarters)} at most in each quarter")
-        if quarters[3].max() > quarters[1].max() + GROWN:
+        if len(quarters) == 4 and quarters[3].max() > quarters[1].max() + GROWN:
             wrong.append(f"{name} grow: {quarters[1].max()} to {quarters[3].max()}")
+    return wrong
+
+
+def growing(samples: Samples, minutes: float) -> list[str]:
+    """Print threads and memory of a short soak; return what grows, and memory whose growth is not determined."""
+    wrong = judged_counts({"threads": samples.threads})
+    times, memory = np.array(samples.minutes), np.array(samples.memory_mb)
+    late = times >= minutes / 4.0
+    quarters = [float(q.mean()) for q in np.array_split(memory, 4) if len(q)]
+    print(f"memory: {', '.join(f'{q:.1f}' for q in quarters)} MB by quarter, {max(memory, default=0.0):.0f} MB at most")
+    try:
+        found = slope(times[late], memory[late])
+    except ValueError as error:
+        wrong.append(f"memory: its growth is not determined: {error}; the last three quarters of a soak count")
+        return wrong
+    print(f"  over the last {0.75 * minutes:.0f} min: {found} MB")
+    if found.low > LEVEL_MB:
+        wrong.append(f"memory grows by {found} MB")
     return wrong
 
 

@@ -9,7 +9,7 @@ releases the bench. With `--kill-s` the service is killed as well, at random tim
 * no demand for an angle of one station came twice to the table (its own journal is the witness), but for a station that
   is repeated after a kill;
 * no job failed without a reason, nor without a fault, and jobs succeed after the last fault;
-* descriptors and threads stay level, and memory shows no growth (not judged with kills).
+* descriptors and threads stay level, and memory has a slope that shows no growth (not judged with kills).
 """
 
 import argparse
@@ -36,8 +36,7 @@ from tests.conformance.served import served
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.wired_bench import THERMAL_LANGUAGES, bench_file
 from tests.soak.descriptors import Descriptors, descriptors_of
-from tests.soak.level import LEVEL_MB, Samples, judged_counts
-from tests.soak.slope import slope
+from tests.soak.level import Samples, growing
 from tests.soak.wire_faults import Faults
 from tests.soak.wire_journal import Journal
 
@@ -166,24 +165,6 @@ def checked_recordings(load: WiredLoad, client: httpx.Client, journal: Journal) 
     return good, wrong
 
 
-def level(samples: Samples, descriptors: Descriptors, minutes: float) -> list[str]:
-    """Print the service's figures; a sentence for each that grows."""
-    wrong = descriptors.judged(minutes) + judged_counts({"threads": samples.threads})
-    times, late = np.array(samples.minutes), np.array(samples.minutes) >= minutes / 4.0
-    memory = np.array(samples.memory_mb)
-    quarters = [float(q.mean()) for q in np.array_split(memory, 4)]
-    print(f"memory: {', '.join(f'{q:.1f}' for q in quarters)} MB by quarter, {memory.max():.0f} MB at most")
-    try:
-        found = slope(times[late], memory[late])
-    except ValueError as error:
-        print(f"  no slope: {error}")
-        return wrong
-    print(f"  over the last {0.75 * minutes:.0f} min: {found} MB")
-    if found.low > LEVEL_MB:
-        wrong.append(f"memory grows by {found} MB")
-    return wrong
-
-
 @contextmanager
 def _looked_at(bench: BenchProcess) -> Generator[psutil.Process]:
     """The service's process; what is taken of it is left out where it has ended."""
@@ -242,7 +223,7 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
         print(*(f"  {count} × {reason}" for reason, count in load.reasons.most_common(12)), sep="\n")
         late_s = behind.bench.pace.behind_s
         print(f"table: {journal.demands} demands, {journal.requests} requests; {late_s:.1f} s of bench time given up")
-    return wrong + (level(samples, descriptors, minutes) if not kill_s else [])
+    return wrong + (descriptors.judged(minutes) + growing(samples, minutes) if not kill_s else [])
 
 
 def _behind(load: WiredLoad) -> str:

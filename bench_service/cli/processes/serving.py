@@ -1,22 +1,23 @@
 """The HTTP server, in this thread or in one of its own."""
 
 import errno
-import signal
 import socket
 import sys
 import threading
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import FrameType
 
 import uvicorn
+from fastapi import FastAPI
 
 from bench_service.api.access.identify import Proxies, behind_proxies
 from bench_service.api.http.door import Door, may_listen
+from bench_service.api.http.late_routes import LateRoutes
 from bench_service.app import create_app, open_service
 from bench_service.cli.processes.allocator import limit_allocator
 from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
+from bench_service.cli.processes.ending import calling_at_end
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
 from bench_service.cli.refusal import Refused
@@ -36,14 +37,19 @@ GRACE_S = 3
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server, with a longer queue of connections, and exit code 0 after an orderly end on SIGTERM."""
+    """uvicorn's server, with a longer queue of connections, and exit code 0 after an orderly end on SIGTERM or SIGHUP.
 
-    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Shut down in order on SIGTERM; uvicorn itself would raise it again, and no clean-up at exit would run."""
-        if sig == signal.SIGTERM:
-            self.should_exit = True
-        else:
-            super().handle_exit(sig, frame)
+    uvicorn itself does not know SIGHUP, and would raise SIGTERM again: no clean-up at exit would run.
+    """
+
+    def end(self) -> None:
+        """Shut down in order; from any thread."""
+        self.should_exit = True
+
+    @contextmanager
+    def capture_signals(self) -> Generator[None]:
+        with super().capture_signals(), calling_at_end(self.end):
+            yield
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
@@ -59,17 +65,29 @@ def ready(
     `level`: from which on lines are logged, where the settings do not say.
     Raises `Refused` for an address that it may not listen on, `Misconfigured` for a token that cannot be used, and what
     `open_service` raises, before any thread or signal handler is there. Where the job engine does not start the server
-    ends, and `NotDriving` is raised at the end of the block.
+    ends, and `NotDriving` is raised at the end of the block. A SIGTERM or SIGHUP that comes while the service is being
+    opened ends the server once it runs; one that comes while it is closed, and its bench made safe, changes nothing.
     """
-    with _opened(settings, drive, socket_file, level) as (server, service):
+    servers: list[_Server] = []
+    early = threading.Event()
+
+    def end() -> None:
+        early.set()
+        for server in servers:
+            server.end()
+
+    with calling_at_end(end), _opened(settings, drive, socket_file, level) as (server, service, late):
+        servers.append(server)
+        if early.is_set():
+            server.end()
         yield server
-        _check_start(service)
+        _check_start(service, late)
 
 
 @contextmanager
 def _opened(
     settings: Settings, drive: bool, socket_file: Path | None, level: str
-) -> Generator[tuple[uvicorn.Server, BenchService]]:
+) -> Generator[tuple[_Server, BenchService, LateRoutes]]:
     set_up(settings, level)
     sys.setswitchinterval(SWITCH_S)
     protect(settings)
@@ -78,24 +96,21 @@ def _opened(
     if socket_file is None:
         check_address(settings)
     rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)
+
+    late = LateRoutes(lambda: server.end())
     with ExitStack() as closing:
         with no_collection():
             service = open_service(settings, closing, drive, apart=socket_file is None)
-            server = _server(settings, socket_file, service, closing, rules)
-
-        def end() -> None:
-            server.should_exit = True
-
-        service.at_failed_start(end)
-        yield server, service
+            max_bytes, proxies = int(settings.max_import_mb * 1e6), Proxies.of(settings)
+            app = create_app(service, max_bytes, closing.close, rules, proxies, late)
+            server = _server(settings, socket_file, app)
+        service.at_failed_start(server.end)
+        yield server, service, late
 
 
-def _server(
-    settings: Settings, socket_file: Path | None, service: BenchService, closing: ExitStack, rules: Door
-) -> _Server:
-    """Set up the server of an open service; `closing` is closed when it shuts down."""
+def _server(settings: Settings, socket_file: Path | None, app: FastAPI) -> _Server:
     config = uvicorn.Config(
-        create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules, Proxies.of(settings)),
+        app,
         settings.host,
         settings.port,
         uds=None if socket_file is None else str(socket_file),
@@ -110,8 +125,8 @@ def _server(
     return _Server(config)
 
 
-def _check_start(service: BenchService) -> None:
-    failure = service.failed_start()
+def _check_start(service: BenchService, late: LateRoutes) -> None:
+    failure = service.failed_start() or late.failure()
     if failure is not None:
         raise failure
 
@@ -148,16 +163,17 @@ def serving(settings: Settings, drive: bool = True, socket_file: Path | None = N
 
     Raises as `ready`, but before the block is entered.
     """
-    with _opened(settings, drive, socket_file, "warning") as (running, service):
+    with _opened(settings, drive, socket_file, "warning") as (running, service, late):
         thread = threading.Thread(target=running.run, name="http")
         thread.start()
         try:
             while not running.started:
                 if not thread.is_alive():
-                    _check_start(service)
+                    _check_start(service, late)
                     raise Refused("the service did not start; the lines above say why")
                 pause(0.01)
             service.require_start()
+            late.require()
             yield
         finally:
             running.should_exit = True

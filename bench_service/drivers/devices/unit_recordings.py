@@ -28,7 +28,9 @@ LOOK_S = 0.01
 
 
 class UnitRecordings:
-    """Data link of a unit over a stream of frames: implements `procedures.bench.imu.Imu` but for its identity."""
+    """Base of the data links of real units, over a stream of frames: implements `procedures.bench.imu.Imu` but for its
+    identity.
+    """
 
     def __init__(
         self,
@@ -46,7 +48,9 @@ class UnitRecordings:
         self._launched_s: float | None = None
 
     async def found(self, identity: DeviceIdentity) -> Found:
-        """Wait for the first frame where the unit has power. Raises `Disconnected`."""
+        """Wait for the first frame where the unit has power, and return identity and status. Raises `Disconnected`
+        where none comes in time.
+        """
         self._stream.begin()
         until = wall_clock.monotonic_s() + self._answer_s
         while self._context.powered() and self._stream.last_frame_s == 0.0:
@@ -66,11 +70,13 @@ class UnitRecordings:
             await pause_async(LOOK_S)
 
     def status(self) -> Status:
-        """Status words of the newest frame; see the port."""
+        """Return the status words of the newest frame. Implements `Imu.status`."""
         return tuple(StatusWord(name, raw, bits) for name, raw, bits in self._stream.words())
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording with the first sample from now on; see the port."""
+        """Begin a recording with the first sample from now on, and return its stream of blocks. Raises `NotPowered`,
+        `OutOfRange`. Implements `Imu.record`.
+        """
         if not 0.0 <= duration_s < float("inf"):
             raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")
         if not self._context.powered():

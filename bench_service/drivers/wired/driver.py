@@ -37,7 +37,7 @@ REAL_UNIT: tuple[Kind, ...] = ("turntable", "supply", "unit_link")
 
 
 class WiredBench(RegisteredBench):
-    """A bench with real devices; closing it drops their links."""
+    """A bench with real devices during a job; closing it drops their links."""
 
     def __init__(
         self,
@@ -51,14 +51,16 @@ class WiredBench(RegisteredBench):
         self._devices = devices
 
     def close(self) -> None:
-        """Drop the devices' links, then give the register's back."""
+        """Drop the devices' links, then release the register's link."""
         for device in self._devices.values():
             device.close()
         super().close()
 
 
 class BenchFileDriver:
-    """Implements `bench_service.bench.driver.BenchDriver` by a bench file."""
+    """Driver of a bench that a bench file describes, real and simulated devices mixed. Implements
+    `bench_service.bench.driver.BenchDriver`.
+    """
 
     def __init__(
         self, file: BenchFile, simulated: SimulatedDriver, register: DeviceRegister, asking: Asking | None
@@ -84,7 +86,7 @@ class BenchFileDriver:
         return self._description
 
     def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
-        """The units that have a file; those of the simulation where the unit is simulated."""
+        """Return the units that have a file; those of the simulation where the unit is simulated."""
         return self._simulated.mounted(serial) if self._file.within("unit_link") else self._units
 
     def open(
@@ -115,6 +117,11 @@ class BenchFileDriver:
         except BaseException:
             link.close()
             raise
+
+    def warm_up(self) -> None:
+        """Load what a simulated unit needs, where the bench file has one."""
+        if self._file.within("unit_link"):
+            self._simulated.warm_up()
 
     def _need_devices(self, needs: BenchNeeds) -> None:
         before = dict(self._found)
@@ -216,15 +223,15 @@ class BenchFileDriver:
         return self._devices.device_state()
 
     def compare(self, by: str) -> tuple[str, ...]:
-        """Compare the devices with their register; see `WiredDevices`."""
+        """Compare the devices with their register and return the differences; see `WiredDevices.compare`."""
         return self._devices.compare(by)
 
     def make_safe(self, by: str) -> DeviceState:
-        """Make the devices safe without a job; see `WiredDevices`."""
+        """Make the devices safe without a job, and return their state; see `WiredDevices.make_safe`."""
         return self._devices.make_safe(by)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
-        """Nothing: of a bench with real devices no truth is known."""
+        """Return nothing: of a bench with real devices no true values are known."""
         return ()
 
 

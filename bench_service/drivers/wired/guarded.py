@@ -59,7 +59,9 @@ class GuardedTurntable(Guarded):
 
 
 class LaunchingSupply:
-    """A supply that notes when the unit was switched on, and waits for its valid data; every other verb is its own."""
+    """A supply that records when the unit was switched on, and waits for its valid data; every other verb is its
+    own.
+    """
 
     def __init__(self, supply: Any, now_s: Callable[[], float], ready: Callable[[], Awaitable[None]]) -> None:
         """Set up; `ready`: waits until the unit says that its data are valid, within a bound; raises nothing."""

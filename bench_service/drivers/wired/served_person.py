@@ -22,7 +22,9 @@ class ServedPerson:
         self._address = address
 
     async def set_by_hand(self, angles: TableAngles, request: str) -> None:
-        """Have the unit set; see the port. Raises `Disconnected`, `DeviceFault` with the person's reason."""
+        """Have the served person set the unit, and wait until that is confirmed. Raises `Disconnected`, `DeviceFault`
+        with the person's reason.
+        """
         try:
             async with asyncio.timeout(CONNECT_S):
                 reader, writer = await asyncio.open_connection(self._address.host, self._address.port)
