@@ -141,7 +141,7 @@ def create_app(
     proxies: identify.Proxies,
     late: late_routes.LateRoutes,
 ) -> FastAPI:
-    """The application around a service that is open; `at_end` is called when the server shuts down.
+    """Return the FastAPI application around a service that is open; `at_end` is called when the server shuts down.
 
     `rules`: decide which requests are let in; `proxies`: those that authenticate people; `late`: begun when the server
     answers, it loads all routes but those of health.

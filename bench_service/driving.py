@@ -5,9 +5,12 @@ from functools import partial
 
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import Heartbeat, LiveBoard
+from bench_service.bench.processes import Watch
+from bench_service.bench.worker_patience import ending_s
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
 from bench_service.collector import no_collection
+from bench_service.drivers.composition import longest_safe_s
 from bench_service.evidence.spread_processes import spread_processes
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.instrumented_runner import InstrumentedRunner
@@ -34,7 +37,9 @@ def driving(
     files: BenchFiles,
     closing: ExitStack,
 ) -> tuple[Worker, LiveBoard]:
-    """Compose the worker of this process's bench, with its lease, heartbeat and stop guard. Raises `BenchBusy`."""
+    """Return the worker and the live state of this process's bench, after its lease was taken and its heartbeat and
+    stop guard were set up. Raises `BenchBusy`.
+    """
     lease = acquire_lease(settings.database_url, settings.bench_id)
     closing.callback(lease.release)
     files.begin_driving()
@@ -47,9 +52,12 @@ def driving(
     runner = InstrumentedRunner(
         stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped, spread
     )
-    manual = ManualRunner(stores, stores.audit, driver, board, files.stopped)
-    worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease, files, manual))
-    guard = files.guard(partial(_stop_now, runner, manual), worker.wake)
+    patience_s = ending_s(longest_safe_s(settings))
+    manual = ManualRunner(stores, stores.audit, driver, board, files.stopped, patience_s)
+    worker = Worker(
+        runner, partial(_engine, settings, patience_s), partial(_dispatcher, settings, stores, lease, files, manual)
+    )
+    guard = files.guard(partial(_stop_now, runner, manual, files.host), worker.wake)
     guard.begin()
     closing.callback(guard.end)
     closing.callback(files.keep_books(stores).end)
@@ -57,13 +65,13 @@ def driving(
     return worker, board
 
 
-def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
+def _engine(settings: Settings, patience_s: float, runner: JobRunner) -> JobEngine:
     """Make the job engine, imported here because that takes as long as the rest of the service."""
     with no_collection():
         from bench_service.jobs.engine import Engine
 
     books = engine_database(settings.database_url, settings.bench_id)
-    return Engine(*books, settings.bench_id, runner, as_storage_error)
+    return Engine(*books, settings.bench_id, runner, as_storage_error, patience_s)
 
 
 def _dispatcher(
@@ -78,7 +86,12 @@ def _dispatcher(
     return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s, files.stopped, manual)
 
 
-def _stop_now(jobs: JobRunner, manual: ManualRunner) -> None:
-    """Leave whatever drives the bench, and make the bench safe; called by the stop guard."""
+def _stop_now(jobs: JobRunner, manual: ManualRunner, watch: Watch) -> None:
+    """Leave whatever drives the bench, and make the bench safe.
+
+    Called by the stop guard, again and again while a stop stands and the bench is not safe.
+    """
     manual.stop_now()
     jobs.stop_now()
+    if watch.supervisor() is None:
+        jobs.try_again()

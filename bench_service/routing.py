@@ -35,7 +35,7 @@ class Routes(APIRouter):
     def add_to(self, router: APIRouter) -> None:
         """Build the routes in a router, in their order, with the router's dependencies before their own."""
         for path, endpoint, options in self.declared:
-            given = options | {
+            given: dict[str, Any] = options | {
                 "tags": [*self.tags, *(options.get("tags") or ())],
                 "dependencies": [*self.dependencies, *(options.get("dependencies") or ())],
                 "response_class": get_value_or_default(options["response_class"], self.default_response_class),

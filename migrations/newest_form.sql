@@ -1,4 +1,4 @@
--- revision 0021
+-- revision 0022
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -318,7 +318,6 @@ CREATE TABLE manual_leases (
 	reason VARCHAR NOT NULL, 
 	created_at DATETIME NOT NULL, 
 	until DATETIME NOT NULL, 
-	team VARCHAR NOT NULL, 
 	reservation VARCHAR, 
 	began_at DATETIME, 
 	process VARCHAR NOT NULL, 
@@ -644,5 +643,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0021');
+INSERT INTO "alembic_version" VALUES ('0022');
 

@@ -91,7 +91,9 @@ log = logging.getLogger(__name__)
 
 
 class Audited:
-    """ASGI middleware: performs the act, writes its audit entry, then answers. See `bench_service.telemetry.audit`."""
+    """ASGI middleware that lets a route do the act, writes its audit entry, and then sends the answer. See
+    `bench_service.telemetry.audit`.
+    """
 
     def __init__(self, app: ASGIApp, trail: AuditTrail) -> None:
         self._app = app

@@ -42,7 +42,7 @@ class CheckpointView(BaseModel):
 
 
 class ChainView(BaseModel):
-    """The outcome of a check of the whole chain."""
+    """Outcome of a check of the whole chain of audit entries."""
 
     whole: bool = Field(description="Whether no entry was changed, removed or inserted")
     faults: list[str] = Field(description="Faults found, by entry; at most 20")

@@ -47,7 +47,7 @@ class RecordingSelection(Request):
     ids: list[str] = Field(default_factory=list[str], max_length=20_000, description="Only these recordings")
 
     def query(self) -> Selection:
-        """Convert to the query of the stores."""
+        """Return the conditions in the form that the stores take."""
         labels = tuple(map(LabelSought.parse, self.labels))
         return copied(Selection, self, search=copied(Search, self, labels=labels), ids=tuple(self.ids))
 
@@ -76,7 +76,17 @@ class BatchView(BaseModel):
     def of(cls, batch: AnalysisBatch) -> "BatchView":
         """Convert a batch to its HTTP view."""
         counts = {state: batch.counts.get(state, 0) for state in TaskState}
-        return copied(cls, batch, counts=counts, calibrations=list(batch.calibrations))
+        selection = _as_submitted(batch.selection)
+        return copied(cls, batch, counts=counts, calibrations=list(batch.calibrations), selection=selection)
+
+
+def _as_submitted(stored: dict[str, Any]) -> dict[str, Any]:
+    """Return a stored selection as its request had it: the conditions that it names, labels as `name=value`."""
+    flat = {key: value for key, value in stored.items() if key != "search"} | (stored.get("search") or {})
+    labels = [
+        one["name"] if one["value"] is None else f"{one['name']}={one['value']}" for one in flat.pop("labels", ())
+    ]
+    return {key: value for key, value in (flat | {"labels": labels}).items() if value not in (None, [], ())}
 
 
 class BatchPage(BaseModel):

@@ -48,7 +48,7 @@ def metrics(request: Request, service: Service, hub: Hub) -> Response:
 
 
 class Snapshot(Collector):
-    """All values of one scrape."""
+    """Collector of all metrics of one scrape, read from the service when Prometheus asks."""
 
     def __init__(self, service: BenchService, tallies: Tallies, hub: EventHub) -> None:
         self._service = service
@@ -56,7 +56,9 @@ class Snapshot(Collector):
         self._hub = hub
 
     def collect(self) -> Iterator[Metric]:
-        """Yield the metric families one after the other."""
+        """Yield the metric families: jobs, campaigns, benches, listeners, disk and database. Raises
+        `StorageFailure`.
+        """
         yield from self._jobs()
         yield from self._campaigns()
         yield from self._benches()
@@ -140,7 +142,7 @@ def _buckets(spread: Spread) -> list[tuple[str, float]]:
 
 
 def install(app: FastAPI, service: BenchService) -> None:
-    """Give an application its metrics registry, and measure its requests."""
+    """Give an application the registry of metrics at `app.state`, and have its requests measured."""
     registry = CollectorRegistry()
     app.state.tallies = Tallies(service.stores.tallies)
     app.state.request_metrics = registry

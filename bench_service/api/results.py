@@ -62,7 +62,7 @@ class Lineage(BaseModel):
 
     @classmethod
     def of(cls, result: StoredResult) -> "Lineage":
-        """Take the lineage from a stored result."""
+        """Return the lineage of a stored result in its HTTP form."""
         recordings = [{"id": i, "content_hash": h} for i, h in result.recordings]
         return copied(cls, result, recordings=recordings, job=result.job_id, mounting=result.context.get("mounting"))
 

@@ -38,7 +38,7 @@ class SyntheticRequest(Request):
     seed: int = Field(1, ge=0, le=2**63 - 1)
 
     def synthesis(self) -> Synthesis:
-        """Convert the coefficients to SI units."""
+        """Return the request with its coefficients converted to SI units. Raises `BadParameter`."""
         quantity, unit = KINDS[self.kind]
         sizes = {name: size for name, (_, size) in units.NOISE_DISPLAY[unit].items()}
         noise = NoiseCoefficients(**{name: getattr(self, name) * size for name, size in sizes.items()})

@@ -8,6 +8,7 @@ from concurrent.futures import CancelledError, Future
 from typing import Any, TypeVar
 
 from bench_service.background import NonBlockingQuery
+from bench_service.bench.held_loop import HeldLoop
 from bench_service.bench.observed import ObservedBench
 from bench_service.bench.watchdog import TimeLimits, Watchdog
 from bench_service.model.errors import StorageFailure
@@ -22,6 +23,8 @@ TIME_LIMITS = TimeLimits()
 """Time limits for the answers of devices."""
 UNWIND_S = 1.0
 """Time that a procedure may take to leave a cancelled verb [s, real time]."""
+LEAVE_S = 3.0
+"""Time that a procedure's own ending may take before the devices are made safe all the same [s, real time]."""
 STOPPED = "stopped by an operator"
 STOP_CHECK_S = 0.2
 """Interval at which a move, a settle or a recording checks for a requested stop [s, real time]."""
@@ -56,11 +59,14 @@ class DrivenBench:
         """
         self._stop_stands = stop_stands
         self._name = name
-        self._watchdog = Watchdog(bench.clock, bench.description.origin == "simulated", TIME_LIMITS)
+        simulated = bench.description.origin == "simulated"
+        self._watchdog = Watchdog(bench.clock, simulated, TIME_LIMITS, bench.safe_s)
         self._bench = ObservedBench(bench, self._watchdog)
         self._stop_wanted = NonBlockingQuery("stop", stop_wanted)
         self._unanswered_s = 0.0
         self._unwinding: set[asyncio.Task[Any]] = set()
+        self._before_safe: frozenset[asyncio.Task[Any]] | None = None
+        """Tasks that were there when making safe began; None: it is not under way."""
         self._shutting_down = threading.Event()
         self._stopped = threading.Event()
         self._under_way: Future[Any] | None = None
@@ -123,8 +129,17 @@ class DrivenBench:
                 return
             if self._lost is not None or self._closed:
                 raise Disconnected(self._lost or "the session ended before its devices were safe")
-            self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
+            try:
+                self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
+            except ExceptionGroup:
+                self._leave_late_drivers()
+                raise
             self._is_safe = True
+
+    def _leave_late_drivers(self) -> None:
+        """Count the bench's thread as lost where a driver that was late does not return: a new link avoids it."""
+        if self._lost is None and not self._unwinds():
+            self._lose("a device was not safe in time")
 
     def close(self) -> None:
         """End the thread, and give the devices' links back: later requests to them are refused.
@@ -157,6 +172,7 @@ class DrivenBench:
 
     def _wait(self, future: "Future[T]", stoppable: bool = True) -> T:
         looked_s = monotonic_s()
+        held = None if stoppable or not self._bench.safe_s else HeldLoop(self._loop)
         while True:
             try:
                 return future.result(timeout=STOP_CHECK_S)
@@ -166,6 +182,8 @@ class DrivenBench:
             now_s = monotonic_s()
             passed_s = now_s - looked_s
             silence = self._watchdog.silence(passed_s, 2 * STOP_CHECK_S)
+            if held is not None and held.for_s(min(passed_s, 2 * STOP_CHECK_S)) > TIME_LIMITS.verb_s:
+                silence = f"a driver has held the thread of all devices for {TIME_LIMITS.verb_s:g} s"
             looked_s = now_s
             if silence is not None:
                 self._cancel(future, silence)
@@ -195,8 +213,11 @@ class DrivenBench:
         """Cancel a coroutine on the bench's loop and wait until it has unwound, or is lost."""
         future.cancel()
         if not self._unwinds():
-            self._lost = why
-            log.error("%s, bench %s: %s, and its driver does not return", self._name, self._bench.description.id, why)
+            self._lose(why)
+
+    def _lose(self, why: str) -> None:
+        self._lost = why
+        log.error("%s, bench %s: %s, and its driver does not return", self._name, self._bench.description.id, why)
 
     def _unwinds(self) -> bool:
         """Wait until the work has unwound, as it also has once another thread has ended the session; False: lost."""
@@ -214,13 +235,17 @@ class DrivenBench:
     async def _unwound(self) -> None:
         """Wait for every task of the bench's loop but those that wait here, or that make safe.
 
-        Two stops would wait for each other, and braking may take longer than work takes to unwind.
+        Two stops would wait for each other, and braking may take longer than work takes to unwind. Real devices brake
+        in tasks of their own: once making safe has begun, tasks that were not there before belong to it.
         """
         own = asyncio.current_task(self._loop)
         assert own is not None
         self._unwinding.add(own)
         try:
-            await asyncio.gather(*(asyncio.all_tasks(self._loop) - self._unwinding), return_exceptions=True)
+            left = asyncio.all_tasks(self._loop) - self._unwinding
+            await asyncio.gather(
+                *(left if self._before_safe is None else left & self._before_safe), return_exceptions=True
+            )
         finally:
             self._unwinding.discard(own)
 
@@ -228,12 +253,25 @@ class DrivenBench:
         own = asyncio.current_task(self._loop)
         assert own is not None
         self._unwinding.add(own)
+        self._before_safe = frozenset(asyncio.all_tasks(self._loop) - self._unwinding)
         try:
-            await self._leave()
-        except Exception:  # a defect in the procedure's own ending says nothing of the devices
-            log.exception("%s: its procedure's step could not be left in order", self._name)
+            await self._leave_in_time()
         finally:
             try:
                 await self._bench.make_safe()
             finally:
                 self._unwinding.discard(own)
+                self._before_safe = None
+
+    async def _leave_in_time(self) -> None:
+        """Leave the work, for `LEAVE_S` at the most; a defect in a procedure's own ending says nothing of devices."""
+        leaving = asyncio.ensure_future(self._leave())
+        try:
+            await asyncio.wait((leaving,), timeout=LEAVE_S)
+            late = not leaving.done()
+        finally:
+            leaving.cancel()
+        if late:
+            log.error("%s: its procedure's step could not be left within %g s", self._name, LEAVE_S)
+        elif not leaving.cancelled() and (failure := leaving.exception()) is not None:
+            log.error("%s: its procedure's step could not be left in order", self._name, exc_info=failure)

@@ -14,6 +14,8 @@ from procedures.bench.clock import Clock
 
 MOTIONS = frozenset({"turntable.move_to", "turntable.settle", "turntable.make_safe"})
 """Verbs that answer at the end of a motion."""
+MAKE_SAFE = ".make_safe"
+"""End of the names of verbs that make a device safe."""
 UNWATCHED = frozenset({"imu.stream", "operator.set_by_hand"})
 """Verbs without a time limit: a recording's blocks are watched one by one, and a person may take any time."""
 
@@ -33,12 +35,22 @@ class TimeLimits:
     motion_s: float = 120.0
     """Limit for a motion: longer than the longest, and the table's own limit comes first."""
     simulated_s: float = 5.0
+    margin_s: float = 2.0
+    """Time beyond the longest declared time of a device to be safe: each device has a deadline of its own before it."""
 
 
 class Watchdog:
     """A `bench_service.bench.observed.Observer` that detects silent devices; its caller polls `silence`."""
 
-    def __init__(self, clock: Clock, simulated: bool, limits: TimeLimits) -> None:
+    def __init__(
+        self, clock: Clock, simulated: bool, limits: TimeLimits, safe_s: Mapping[str, float] | None = None
+    ) -> None:
+        """Set up; `safe_s`: the declared times of devices to be safe [s] (`procedures.bench.Bench.safe_s`).
+
+        Where there are any, no device's `make_safe` is silent before the longest of them has passed: a watchdog that
+        ends it ends that of all devices, and the table may brake meanwhile.
+        """
+        self._safe_s = max(limits.verb_s, *safe_s.values()) + limits.margin_s if safe_s else None
         self._clock = clock
         self._simulated = simulated
         self._patience = limits
@@ -50,7 +62,9 @@ class Watchdog:
         self._silent_s = 0.0
 
     def begin(self, verb: str, arguments: Mapping[str, Any]) -> None:
-        if verb not in UNWATCHED:
+        if verb.endswith(MAKE_SAFE) and self._safe_s is not None:
+            self._wait_for(verb, self._safe_s)
+        elif verb not in UNWATCHED:
             self._wait_for(verb, self._patience.motion_s if verb in MOTIONS else self._patience.verb_s)
 
     def end(self, verb: str, failure: BaseException | None) -> None:

@@ -35,7 +35,9 @@ Run = Callable[[str, tuple[Any, ...]], str]
 
 @dataclass(frozen=True)
 class Refusal:
-    """An error on its way to another process: errors with arguments of their own cannot be pickled as they are."""
+    """An error in picklable parts, on its way to another process: errors with arguments of their own cannot be pickled
+    as they are.
+    """
 
     kind: type[Exception]
     arguments: tuple[Any, ...]
@@ -43,11 +45,11 @@ class Refusal:
 
     @classmethod
     def of(cls, error: Exception) -> "Refusal":
-        """Take an error apart into picklable fields."""
+        """Return the picklable parts of an error."""
         return cls(type(error), error.args, dict(vars(error)))
 
     def error(self) -> Exception:
-        """Rebuild the original error."""
+        """Return the original error, rebuilt from its parts."""
         made = self.kind.__new__(self.kind)
         made.args = self.arguments
         vars(made).update(self.fields)
@@ -85,8 +87,8 @@ class WorkProcesses:
                 self._time_idleness()
 
     def result(self, name: str, *arguments: Any) -> str:
-        """Run a piece of work. Raises its errors, `StorageFailure` where it is cut off, and `Overloaded` where
-        too much work is waiting already.
+        """Run a piece of work in a process, wait for it, and return its text. Raises its errors, `StorageFailure` where
+        it is cut off, and `Overloaded` where too much work is waiting already.
         """
         if not self._places.acquire(blocking=False):
             raise Overloaded(f"{self._waiting} such requests are running or waiting already: try again later")
@@ -156,7 +158,7 @@ class WorkProcesses:
 
 @dataclass(frozen=True)
 class WorkApart:
-    """The processes of a service: for analyses, and for printed reports."""
+    """The work processes of a service: those for analyses, and those for printed reports."""
 
     analyses: WorkProcesses
     printing: WorkProcesses

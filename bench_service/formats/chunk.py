@@ -30,7 +30,7 @@ ENCODINGS = {"int32": "DELTA_BINARY_PACKED", "float64": "BYTE_STREAM_SPLIT"}
 
 
 class UnreadableChunk(Exception):
-    """The payload is not the requested chunk."""
+    """Raised where the payload is not the requested chunk, or cannot be decoded."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def rows_per_chunk(channels: int, dtype: SampleType) -> int:
 
 
 def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> bytes:
-    """Encode samples, shape (n, channels), as Parquet with one column for each channel."""
+    """Return samples, shape (n, channels), as the bytes of a Parquet file with one column for each channel."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -80,7 +80,7 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
 
 
 def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
-    """Decode the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
+    """Return the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

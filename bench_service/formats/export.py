@@ -62,7 +62,8 @@ def extract(
     start_s: float | None = None,
     stop_s: float | None = None,
 ) -> Extract:
-    """Select a part by names and by time since the first sample [s]; a sample belongs to its beginning.
+    """Return a part of a recording, by names of channels and by time since its first sample [s]; a sample belongs to
+    its beginning.
 
     Raises `MissingChannel`, `BadParameter`.
     """
@@ -75,6 +76,19 @@ def extract(
     if last < first:
         raise BadParameter("stop_s", stop_s, f"not before start_s = {start_s}")
     return Extract(replace(info, channels=chosen), first, last, dtype)
+
+
+def require_samples(part: Extract, start_s: float | None, stop_s: float | None) -> None:
+    """Refuse a stretch in which no sample begins. Raises `BadParameter` with the range of the recording."""
+    info, begin_s = part.info, start_s or 0.0
+    if part.start < part.stop or info.count == 0:
+        return
+    field, given, end_s = ("start_s", begin_s, info.duration_s) if stop_s is None else ("stop_s", stop_s, stop_s)
+    allowed = (
+        f"a stretch with samples: of {info.rate_hz:g} a second none begins within {begin_s:g} … {end_s:g} s; start_s "
+        f"and stop_s count from the first sample, 0 … {info.duration_s:g}"
+    )
+    raise BadParameter(field, given, allowed)
 
 
 def _sample(info: RecordingInfo, field: str, moment_s: float) -> int:
@@ -101,7 +115,7 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
 
 
 def describe(part: Extract) -> dict[str, str]:
-    """Describe the recording for the reader of the file, as text."""
+    """Return the description of the recording for the reader of the file, as name -> text."""
     info = part.info
     return {
         "recording": info.id,

@@ -27,8 +27,6 @@ from bench_service.telemetry.defects import described
 
 PROCEDURE_ABI = "1"
 """Version of the workflows' contract: raise it when this code can no longer continue stored workflows."""
-SHUT_DOWN_S = 20.0
-"""Time that the running job may take to leave the bench safe when the service ends [s]."""
 RETRY_S = 0.5
 """Interval between two attempts to write a bad end that could not be written [s]."""
 LISTEN_S = 0.1
@@ -45,7 +43,7 @@ log = logging.getLogger(__name__)
 
 
 class JsonSerializer(Serializer):
-    """Step outputs as JSON: a database that can be read, and no pickle in it."""
+    """Serializer of the outputs of steps as JSON for DBOS: a database that can be read, and no pickle in it."""
 
     def serialize(self, data: Any) -> str:
         if isinstance(data, Exception):
@@ -78,8 +76,13 @@ class Engine:
         bench_id: str,
         runner: JobRunner,
         understood: Callable[[Exception], Exception],
+        ending_s: float,
     ) -> None:
-        """Set up with `understood`: translates errors of the engine's own database into the service's own classes."""
+        """Set up with `understood`: translates errors of the engine's own database into the service's own classes.
+
+        `ending_s`: time that the running job may take to leave the bench safe when the service ends [s].
+        """
+        self._ending_s = ending_s
         self._understood = understood
         self._version = f"{bench_id}:{PROCEDURE_ABI}"
         self._runner = runner
@@ -122,13 +125,17 @@ class Engine:
             raise self._understood(error) from error
 
     def run(self, job: Job) -> None:
-        """Run a claimed job to its end. Raises `ShuttingDown`, or the error that kept its workflow unwritten."""
+        """Run a claimed job as a workflow, and block until it has ended. Raises `ShuttingDown`, or the error that kept
+        its workflow unwritten.
+        """
         with SetWorkflowID(_workflow_id(job), workflow_id_reuse_policy="reject"):
             handle = DBOS.start_workflow(self._workflow, job.id, job.attempt)
         handle.get_result()
 
     def unfinished(self, job: QueueEntry) -> Unfinished:
-        """The state of a running job's workflow."""
+        """Return the state of a running job's workflow; one of another version of the service is cancelled, and counts
+        as gone.
+        """
         status = DBOS.get_workflow_status(_workflow_id(job))
         if status is None:
             return Unfinished()
@@ -142,9 +149,9 @@ class Engine:
         return Unfinished(gone=Failure("EngineGaveUp", f"the job engine ended this job as {status.status}"))
 
     def shut_down(self) -> None:
-        """Stop working, once the running job has left the bench safe; it resumes after the next start."""
+        """Stop working, and wait until the running job has left the bench safe; it resumes after the next start."""
         self._ending.set()
-        if self._one_at_a_time.acquire(timeout=SHUT_DOWN_S):
+        if self._one_at_a_time.acquire(timeout=self._ending_s):
             self._one_at_a_time.release()
         DBOS.destroy(destroy_registry=True)
 

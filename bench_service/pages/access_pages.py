@@ -19,6 +19,6 @@ def own_path(given: str) -> str:
 
 @router.get("/log-in")
 def log_in_page(request: Request, next: str = "/") -> HTMLResponse:  # noqa: A002  the name in the address
-    """Page of the log-in; it continues with the page that was wanted."""
+    """Return the HTML page of the log-in; after it the browser goes to `next`, the page that was wanted."""
     headers = {"Cache-Control": "no-store"}
     return templates.TemplateResponse(request, "log_in.html", {"next": own_path(next)}, headers=headers)

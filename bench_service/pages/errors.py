@@ -14,7 +14,9 @@ OF_PROGRAMS = ("/api/", "/static/", "/words/", "/healthz", "/readyz", "/metrics"
 
 
 class ErrorPages:
-    """ASGI middleware that shows the problem document of a page's address as a page, to who accepts HTML."""
+    """ASGI middleware that turns a problem document of a page's address into an HTML page, where the client accepts
+    HTML.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

@@ -21,7 +21,7 @@ def expect() -> None:
 
 
 def draw_in(processes: WorkProcesses | None) -> None:
-    """Draw in another process from now on; None: in this one."""
+    """Have figures drawn in these processes from now on; None: in this process."""
     _elsewhere[:] = [] if processes is None else [processes]
 
 

@@ -10,7 +10,9 @@ PACKAGES = ("bench_service", "procedures", "simulators")
 
 
 def code_version() -> str:
-    """The running code's version, as ``0.1.0+3f9a0c1b2d4e``: 12 digits of SHA-256 over all Python sources, by path."""
+    """Return the running code's version, as ``0.1.0+3f9a0c1b2d4e``: 12 digits of SHA-256 over all Python sources, by
+    path.
+    """
     root = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for package in PACKAGES:

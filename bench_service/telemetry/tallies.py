@@ -2,12 +2,13 @@
 
 Every API process gives the same numbers, also after a restart, so scrape one of them or take the maximum. A scrape
 reads only jobs that have ended since the one before: those of the last `OVERLAP` again, because a commit on another
-machine may come later than its time says. A job that failed, was resumed and ended again counts as both until the
-process restarts, then as the last.
+machine may come later than its time says. Among finished jobs, one that failed, was resumed and ended again counts as
+both until the process restarts, then as the last; its stations count once.
 """
 
 from bisect import bisect_left
 from collections import Counter
+from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
@@ -30,7 +31,7 @@ DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 
 
 @dataclass(frozen=True)
 class Ending:
-    """A job that has ended, as a row of the tally."""
+    """A job that has ended, as a row of the tally: procedure, state, verdict, times."""
 
     id: str
     procedure: str
@@ -43,28 +44,28 @@ class Ending:
 
 
 class TallyStore(Protocol):
-    """PORT of memory: the rows that are counted."""
+    """Reader of the rows that are counted for metrics. Interface; the SQL is in `persistence`."""
 
     def endings(self, since: datetime | None, after: str, limit: int) -> tuple[Ending, ...]:
-        """Jobs that ended at `since` with a greater id than `after`, or later; in that order."""
+        """Return at most `limit` jobs that ended at `since` with a greater id than `after`, or later; in that order."""
         ...
 
-    def stations_of_open_jobs(self) -> int:
-        """Number of stations done of jobs that have not ended."""
+    def stations_of_open_jobs(self) -> Mapping[str, int]:
+        """Return the number of stations done, by id of each job that has not ended and has done any."""
         ...
 
     def recorded_bytes(self) -> int:
-        """Stored bytes of all recordings that are listed."""
+        """Return the stored bytes of all recordings that are listed."""
         ...
 
     def free_bytes(self) -> int | None:
-        """Free bytes on the disk of the database's file; None for a database of another machine."""
+        """Return the free bytes on the disk of the database's file; None for a database of another machine."""
         ...
 
 
 @dataclass
 class Spread:
-    """A histogram of durations."""
+    """Histogram of durations in the classes of `DURATION_S`, with their sum [s]."""
 
     counts: list[int] = field(default_factory=lambda: [0] * (len(DURATION_S) + 1))
     sum_s: float = 0.0
@@ -76,7 +77,7 @@ class Spread:
 
 
 class Tallies:
-    """The counts of this process, updated at each scrape."""
+    """Counts of ended jobs for the metrics of this process, updated at each scrape from the jobs that ended since."""
 
     def __init__(self, store: TallyStore) -> None:
         self.store = store
@@ -96,11 +97,14 @@ class Tallies:
         self.waits = Spread()
         """Durations from submission to start."""
         self._ended_stations = 0
+        """Number of stations of all jobs that ended, by their last end."""
+        self._may_resume: dict[str, int] = {}
+        """Those of each job that may be resumed from its end."""
         self._recent: dict[tuple[str, datetime], None] = {}
         self._newest: datetime | None = None
 
     def update(self) -> None:
-        """Count the jobs that ended since. Raises `StorageFailure`."""
+        """Count the jobs that ended since the last call. Raises `StorageFailure`."""
         with self._lock:
             at = now()
             if self._newest is not None and at < self._newest - OVERLAP:
@@ -113,11 +117,19 @@ class Tallies:
             if self._newest is not None:
                 self._newest = min(self._newest, at)
                 self._recent = {k: None for k in self._recent if k[1] >= self._newest - OVERLAP}
-            self.stations = self._ended_stations + self.store.stations_of_open_jobs()
+            self.stations = self._all_stations()
             self._add_up_recordings()
 
+    def _all_stations(self) -> int:
+        """Number of stations done by all jobs; those of a resumed job are open again, and end no earlier."""
+        still = self.store.stations_of_open_jobs()
+        resumed = sum(self._may_resume.get(job, 0) for job in still)
+        return self._ended_stations - resumed + sum(still.values())
+
     def ended(self) -> dict[JobState, int]:
-        """Number of jobs in each state that is never left, as tallied: the database counts longer with the history."""
+        """Return the number of jobs in each state that is never left, as tallied: the database counts longer with the
+        history.
+        """
         found = Counter[str]()
         for (_, state, _), count in self.finished.items():
             found[state] += count
@@ -145,7 +157,9 @@ class Tallies:
         self._recent[key] = None
         self._newest = ending.finished_at if self._newest is None else max(self._newest, ending.finished_at)
         self.finished[ending.procedure, ending.state, ending.verdict or ""] += 1
-        self._ended_stations += ending.stations_done
+        self._ended_stations += ending.stations_done - self._may_resume.pop(ending.id, 0)
+        if ending.stations_done and JobState(ending.state) not in NEVER_LEFT:
+            self._may_resume[ending.id] = ending.stations_done
         if ending.started_at is not None:
             duration_s = (ending.finished_at - ending.started_at).total_seconds()
             self.durations.setdefault(ending.procedure, Spread()).add(max(0.0, duration_s))

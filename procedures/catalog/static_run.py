@@ -20,7 +20,8 @@ from procedures.core.recording import TRIADS, Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import LAUNCH, NoiseLimits, NoiseParameters, NoiseResult, analyse_launches, noise_checks
+from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
+from procedures.noise_limits import NoiseLimits, noise_checks
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -29,8 +30,15 @@ DWELL_STEP_S = 5.0
 
 
 class Limits(NoiseLimits):
-    """Requirements of a launch on the bench: those of its noise, and readiness within ten minutes (table 1.4)."""
+    """Requirements of a launch on the bench: noise (thesis 4.3, 5.6), and readiness within ten minutes (table 1.4)."""
 
+    gyro_random_walk_deg_sqrt_h: float = Field(0.003, gt=0.0, le=1e6)  # pyright: ignore[reportIncompatibleVariableOverride]
+    gyro_bias_in_run_deg_h: float = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        0.015, gt=0.0, le=1e6, description="bias instability"
+    )
+    accelerometer_bias_in_run_m_s2: float = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        0.0005, gt=0.0, le=100.0, description="bias instability"
+    )
     readiness_s: float | None = Field(
         600.0,
         gt=0.0,
@@ -70,12 +78,12 @@ class Result(NoiseResult):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Nothing depends on unit or bench."""
+    """Return the parameters as they are: nothing depends on unit or bench."""
     return params
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Stations of the run, one a launch."""
+    """Return the stations of the run, one a launch."""
     angles = TableAngles(params.outer_deg, params.middle_deg, params.inner_deg)
     return tuple(
         Station(
@@ -94,7 +102,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Predict the duration, and the uncertainty of each expected coefficient after all launches."""
+    """Return the duration, and the uncertainty of each expected coefficient after all launches."""
     stations = schedule(params)
     duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
     found: list[PredictedUncertainty] = []
@@ -121,23 +129,25 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Off, on, turn to the orientation, record; launch after launch."""
+    """Switch off and on, turn to the orientation, record, launch after launch; yield the stream of each."""
     for station in stations:
         yield await steps.record_station(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Analyse each launch on its own, then all of them together."""
+    """Return the noise of each launch on its own, and of all of them together. Raises `UnfitRecording`,
+    `MissingChannel`.
+    """
     return analyse_launches(Result, recordings, params, context.unit)
 
 
 def report(result: Result) -> Report:
-    """Tables 4.1 and 4.2 of the thesis, and the plots behind them."""
+    """Return the report: tables 4.1 and 4.2 of the thesis, and the plots behind them."""
     return noise_report(result.launches, result.channels, result.averaging_time_s, result.drawn_launch)
 
 
 def learns(result: Result, unit: Unit, origin: str) -> Unit:
-    """Update the unit's record with the noise and the averaging time found, for later previews and dwells.
+    """Return the unit's record with the noise and the averaging time found, for later previews and dwells.
 
     A process that no launch shows enters with the mean square that its upper limit leaves likely, and is named.
     """
@@ -162,7 +172,7 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Checks that a result will have; for channels in counts only that there is noise."""
+    """Return the names of the checks that a result will have; for channels in counts only that there is noise."""
     rates = [(c.name, c.rate_unit) for c in context.unit.channels if c.rate_unit in ("rad/s", "m/s^2")]
     walks = [f"{name} random walk" for name, unit in rates if unit == "rad/s"]
     if not rates:
@@ -177,8 +187,8 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
-    """Checks of the noise coefficients, the mean over the launches."""
-    return tuple(noise_checks(params, context.unit, params.duration_s, params.launches))
+    """Return the planned checks of the noise coefficients, the mean over the launches."""
+    return tuple(noise_checks(params.noise_limits, context.unit, params.duration_s, params.launches))
 
 
 def _origins(unit: Unit) -> str:

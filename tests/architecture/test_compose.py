@@ -12,8 +12,8 @@ import yaml
 
 from bench_service.api.http.door import may_listen
 from bench_service.bench.stop.messages import split_address
+from bench_service.bench.worker_patience import ENDING_S
 from bench_service.cli.commands import app, run_command_line
-from bench_service.jobs.engine import SHUT_DOWN_S
 from bench_service.settings import Settings
 
 FILE = Path(__file__).resolve().parents[2] / "docker-compose.yml"
@@ -68,7 +68,7 @@ def test_two_benches_have_a_worker_each_and_a_supervisor_that_outlives_it() -> N
         assert worker["hostname"] == supervisor["hostname"]
         assert worker["volumes"] == supervisor["volumes"], "the devices' registers"
         assert worker["volumes"] == [f"{bench}:{worker['environment']['BENCH_DEVICE_FOLDER']}"]
-        assert int(worker["stop_grace_period"].removesuffix("s")) > SHUT_DOWN_S
+        assert int(worker["stop_grace_period"].removesuffix("s")) > ENDING_S
 
 
 def test_the_api_drives_nothing_and_listens_on_this_host_only() -> None:

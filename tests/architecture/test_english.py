@@ -14,7 +14,9 @@ HEADLESS_DOCSTRING = re.compile(rf'(?:\A|:(?:  #.*)?\n)\s*"""((?:{"|".join(HEADL
 LEAST_WORDS = 4
 MOST_SHORT = 10
 """Summaries that may have fewer words; each is one more than none, and a new one pushes an old one out."""
-POETIC = re.compile(r"^(Told\w*|\w*Beside\w*|\w*Whoever\w*|\w*Eye|\w*Nobody\w*|in_our_words|\w+Desk|[Pp]atien\w+)$")
+POETIC = re.compile(
+    r"^(Question|Told\w*|\w*Beside\w*|\w*Whoever\w*|\w*Eye|\w*Nobody\w*|in_our_words|\w+Desk|[Pp]atien\w+)$"
+)
 PRIVATE = re.compile(r"in our words|nobody's|\bthe told\b|\bpatience\b", re.IGNORECASE)
 
 

@@ -155,7 +155,7 @@ def test_no_set_goes_out_twice_and_no_answer_is_taken_for_another(
 
 
 def test_an_answer_that_is_late_is_never_taken_for_the_next_question(tmp_path: Path) -> None:
-    """Every seventh answer comes late by more than the time-out: no reading holds another question's number."""
+    """Every seventh answer comes late by more than the time-out: no reading holds another request's number."""
 
     async def scene(rig: ChamberRig) -> None:
         await rig.port.command(60.0, 3.0)

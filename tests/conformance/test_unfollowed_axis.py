@@ -19,7 +19,7 @@ RATE = ConstantRate("outer", 5.0, 100.0, 1.0)
 
 
 class Table:
-    """The driver, with a line on which every question raises what the test says; nothing is connected."""
+    """The driver, with a line on which every request raises what the test says; nothing is connected."""
 
     def __init__(self, folder: Path, reading: BaseException, stopping: BaseException) -> None:
         self.notes: list[tuple[str, dict[str, Any]]] = []

@@ -38,8 +38,10 @@ class BenchProcess:
         self.client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30, limits=fresh)
 
     def start(self) -> None:
+        before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the suite may run under nohup
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(self.command, env=self.environment, stdout=log, stderr=log)
+        signal.signal(signal.SIGHUP, before)
         self.until(self._answers, 90)
 
     def _answers(self) -> bool:
@@ -53,10 +55,10 @@ class BenchProcess:
         self.process.send_signal(signal.SIGKILL)
         self.process.wait()
 
-    def terminate(self) -> float:
+    def terminate(self, number: signal.Signals = signal.SIGTERM) -> float:
         """Ask it to end, which it must do in order; how long that took [s]."""
         begun = monotonic_s()
-        self.process.send_signal(signal.SIGTERM)
+        self.process.send_signal(number)
         assert self.process.wait(30) == 0, self.log.read_text()
         return monotonic_s() - begun
 

@@ -1,6 +1,7 @@
 """The command line as an operating system process: what it prints, its exit codes, and how it ends."""
 
 import json
+import signal
 import socket
 from collections.abc import Generator
 from pathlib import Path
@@ -11,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bench_service.jobs.engine import SHUT_DOWN_S
+from bench_service.bench.worker_patience import ENDING_S
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.command_line import Command, command_here, command_in, one_line
 
@@ -137,7 +138,7 @@ def test_a_file_is_imported_and_analysed(bench_here: Command, tmp_path: Path) ->
     ]
     description = tmp_path / "poses.json"
     description.write_text(json.dumps({"unit": "HAND-1", "rate_hz": 50.0, "channels": channels}))
-    imported = bench_here("import", tmp_path / "poses.csv", "--description", description)
+    imported = bench_here("import", tmp_path / "poses.csv", "--description", description, "--json")
     assert imported.code == 0, imported.err
     recording = imported.json()["id"]
     arguments = ("analyse", "scalar_calibration", "--recording", recording)
@@ -236,12 +237,13 @@ def test_a_service_that_is_asked_to_end_does_so_soon_and_its_job_goes_on_after_t
     body = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "seed": 7}
     job = served.client.post("/api/v1/jobs", json=body).json()["id"]
     served.station_reached(job, 3)
-    assert served.terminate() < SHUT_DOWN_S, "a job was waited for that does not end"
+    assert served.terminate(signal.SIGHUP) < ENDING_S, "a job was waited for that does not end"
     assert "Traceback" not in served.log.read_text()
+    assert "supervisor" not in served.state().by, "the service made its bench safe itself"
     served.start()
     ended = served.station_reached(job, 13)
     assert (ended["state"], ended["verdict"]) == ("succeeded", "pass"), ended
     items = served.recordings(job)
     assert sorted(r["station"]["index"] for r in items if r["state"] == "complete") == list(range(12))
-    assert served.terminate() < SHUT_DOWN_S, "a job was waited for that does not end"
+    assert served.terminate() < ENDING_S, "a job was waited for that does not end"
     assert "Traceback" not in served.log.read_text()

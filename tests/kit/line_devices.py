@@ -23,7 +23,7 @@ from procedures.core.turn import Turn
 
 @dataclass
 class LineDevice:
-    """State of a served device, its faults, and every question that it was asked."""
+    """State of a served device, its faults, and every request that it was asked."""
 
     state: dict[str, Any]
     port: int = 0
@@ -32,15 +32,15 @@ class LineDevice:
     asked: list[str] = field(default_factory=list)
 
     def demands(self) -> list[str]:
-        """The demands among the questions."""
+        """The demands among the requests."""
         return [verb for verb in self.asked if verb not in ("identify", "read")]
 
-    def answer(self, question: dict[str, Any]) -> dict[str, Any]:
-        verb = question["verb"]
+    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        verb = request["verb"]
         self.asked.append(verb)
         if verb == "identify":
             return self.state["identity"]
-        self.state |= {k: v for k, v in question.items() if k != "verb"}
+        self.state |= {k: v for k, v in request.items() if k != "verb"}
         return self.state
 
 
@@ -91,7 +91,7 @@ def _client(device: LineDevice) -> Callable[[asyncio.StreamReader, asyncio.Strea
 
 
 class _Line:
-    """One link: a question at a time; a link whose answer did not come is dropped, so no late answer is taken."""
+    """One link: a request at a time; a link whose answer did not come is dropped, so no late answer is taken."""
 
     def __init__(self, section: Any, context: DriverContext) -> None:
         self.section, self.context = section, context

@@ -2,14 +2,17 @@
 
 from collections.abc import Generator
 from contextlib import ExitStack
+from datetime import timedelta
 
 import httpx
 import pytest
 
 from bench_service.app import open_service
 from bench_service.cli.processes.serving import serving
+from bench_service.model.manual import ManualLease
+from bench_service.persistence import open_stores
 from bench_service.settings import Settings
-from bench_service.wall_clock import monotonic_s, pause
+from bench_service.wall_clock import monotonic_s, new_id, now, pause
 from tests.kit.people import House, free_port, house
 from tests.service.client import Client
 
@@ -213,3 +216,39 @@ def test_a_job_goes_on_when_its_submitters_token_is_revoked(tmp_path_factory: py
             with httpx.Client(base_url=http.base_url) as nobody:
                 assert nobody.get(f"/api/v1/jobs/{job}/events").status_code == 401
                 assert nobody.get(f"/api/v1/jobs/{job}/events", params={"token": token}).status_code == 400
+
+
+def open_lease(home: House, reservation: str | None) -> str:
+    """Open al's lease of manual mode, as where a worker drives the bench; its address."""
+    stores, opened = open_stores(home.settings.database_url)
+    at = now()
+    lease = ManualLease(
+        new_id(), "sim", "SIM-0001", "al", True, "a look", at, at + timedelta(minutes=5), reservation=reservation
+    )
+    stores.manual.begin(lease)
+    opened.dispose()
+    return f"/api/v1/benches/sim/manual/{lease.id}"
+
+
+def test_manual_mode_follows_its_own_reservation_and_no_later_one(home: House, people: dict[str, httpx.Client]) -> None:
+    """A later reservation of another team would take `halt` from the operator at a turning table."""
+    lease, halt = open_lease(home, None), {"kind": "halt"}
+    later = people["bea"].post("/api/v1/reservations", json={"bench": "sim", "holder": "bea", "minutes": 5}).json()
+    assert people["al"].post(f"{lease}/demands", json=halt).status_code == 202
+    assert people["al"].post(f"{lease}/renew", json={"minutes": 3}).status_code == 200
+    assert people["al"].post(f"{lease}/end").status_code == 200, "without a reservation: any operator"
+    assert people["bea"].delete(f"/api/v1/reservations/{later['id']}").status_code == 200
+
+    unit = people["al"].post("/api/v1/reservations", json={"unit": "SIM-0001", "holder": "al", "minutes": 5}).json()
+    body = {"reason": "a look", "reservation": unit["id"]}
+    refused = people["bea"].post("/api/v1/benches/sim/manual", json=body)
+    assert (refused.status_code, "team alpha" in refused.json()["detail"]) == (403, True)
+    assert people["al"].post("/api/v1/benches/sim/manual", json=body).status_code == 503, "nothing drives this bench"
+    lease = open_lease(home, unit["id"])
+    for verb, given in (("demands", halt), ("renew", {"minutes": 3}), ("end", None)):
+        refused = people["bea"].post(f"{lease}/{verb}", json=given)
+        assert (refused.status_code, "team alpha" in refused.json()["detail"]) == (403, True), verb
+    assert people["al"].post(f"{lease}/demands", json=halt).status_code == 202
+    assert people["amy"].post(f"{lease}/end").status_code == 200, "a colleague's"
+    people["admin"].delete(f"/api/v1/reservations/{unit['id']}")
+    assert people["al"].post("/api/v1/benches/sim/manual/none/end").status_code == 404

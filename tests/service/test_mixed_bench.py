@@ -91,9 +91,9 @@ def test_an_encoder_that_disagrees_fails_the_job(east: tuple[Client, LineDevice]
     client, table = east
     honest = table.answer
 
-    def lying(question: dict[str, Any]) -> dict[str, Any]:
-        answer = honest(question)
-        return {**answer, "angles": [a + 5.0 for a in answer["angles"]]} if question["verb"] == "read" else answer
+    def lying(request: dict[str, Any]) -> dict[str, Any]:
+        answer = honest(request)
+        return {**answer, "angles": [a + 5.0 for a in answer["angles"]]} if request["verb"] == "read" else answer
 
     table.answer = lying  # type: ignore[method-assign]
     try:

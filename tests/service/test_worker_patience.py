@@ -1,18 +1,22 @@
 """How long a supervisor waits for a worker that makes the bench safe: by the declared times of the bench's devices."""
 
+from contextlib import ExitStack
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
+from bench_service import driving
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.stop.channel import WORKER, StopChannel
 from bench_service.bench.stop.word import StopAnswer, StopWord
-from bench_service.bench.worker_patience import HUNG_S, UNANSWERED_S, WorkerPatience, hung_after_s
+from bench_service.bench.worker_patience import ENDING_S, HUNG_S, UNANSWERED_S, WorkerPatience, hung_after_s
 from bench_service.cli.processes import supervising
 from bench_service.drivers.composition import longest_safe_s
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.interface import registry
+from bench_service.jobs import engine
 from bench_service.settings import Settings
 from tests.kit import line_devices
 from tests.kit.line_devices import bench_text
@@ -76,6 +80,24 @@ def test_the_supervisor_is_given_that_time(tmp_path: Path, monkeypatch: pytest.M
     settings = settings_of(tmp_path, "safe_s = 60.0").model_copy(update={"stop_listen": ""})
     assert supervising.supervise(settings, False, lambda _: None) == 0
     assert given == {"hung_s": 65.0}
+
+
+@pytest.mark.parametrize(("declared", "ending_s"), [("safe_s = 60.0", 70.0), ("safe_s = 2.0", ENDING_S)])
+def test_a_service_that_ends_waits_for_the_slowest_device_of_the_bench_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, declared: str, ending_s: float
+) -> None:
+    """Nobody else makes a bench safe that `bench run` drives: it has no supervisor."""
+    given: list[object] = []
+    monkeypatch.setattr(registry, "SHIPPED", line_devices.SHIPPED)
+    for name in ("acquire_lease", "LiveBoard", "Heartbeat", "spread_processes", "begin_notifier"):
+        monkeypatch.setattr(driving, name, MagicMock())
+    monkeypatch.setattr(driving, "ManualRunner", lambda *arguments: given.append(arguments[-1]))
+    monkeypatch.setattr(engine, "Engine", lambda *arguments: given.append(arguments[-1]))
+    settings = settings_of(tmp_path, declared)
+    with ExitStack() as closing:
+        worker, _ = driving.driving(settings, *(MagicMock() for _ in range(7)), closing)
+    worker._make_engine(worker._runner)
+    assert given == [ending_s, ending_s]
 
 
 def test_a_simulated_bench_and_a_bench_file_that_is_gone(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import struct
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,6 +81,26 @@ def test_the_c_and_python_functions_agree_with_correct_within_four_ulp(tmp_path:
     in_python = np.array([runpy.run_path(str(tmp_path / "calibration.py"))[f"correct_{triad}"](row) for row in u[:50]])
     assert ulps(in_python, wanted[:50]) <= 4.0
     np.testing.assert_allclose(in_c, inputs(triad, n=2000), rtol=0, atol=1e-13 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("triad", list(UNITS))
+def test_the_python_function_takes_samples_in_rows_and_refuses_every_other_shape(triad: str) -> None:
+    subject = a_subject(seed=4)
+    one = subject.triad(triad)
+    assert one is not None
+    names: dict[str, Any] = {}
+    exec(text("python", subject), names)
+    function = names[f"correct_{triad}"]
+    v = inputs(triad, n=7)
+    u = outputs(one.value, v)
+    for rows in (u, u[:3], u.tolist(), list(u), u[:1], u.reshape(7, 1, 3)):
+        found = np.asarray(function(rows))
+        assert found.shape == np.shape(rows)
+        np.testing.assert_allclose(found.reshape(-1, 3), v[: found.size // 3], rtol=0, atol=1e-13 * np.abs(v).max())
+    assert function(u[0].tolist()) == function(u.tolist())[0]
+    for other in (u.T, u[:, :2], u[0, :2], u.T.tolist(), [1.0, 2.0], [1.0] * 4, [], list(u.T), u[0, 0]):
+        with pytest.raises(ValueError, match=r"it must be one sample \(x, y, z\) or samples in rows, shape \(n, 3\)"):
+            function(other)
 
 
 def test_our_json_has_both_models_the_covariance_and_where_they_hold() -> None:

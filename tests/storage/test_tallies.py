@@ -38,3 +38,43 @@ def test_a_job_that_failed_and_was_resumed_is_one_job(stores: Stores, new_job: C
     moved(JobState.RUNNING)
     moved(JobState.SUCCEEDED, verdict=Verdict.PASS)
     assert states() == {"succeeded": 1, "cancelled": 1}
+
+
+def test_stations_of_a_resumed_job_are_counted_once(stores: Stores, new_job: Callable[..., Job]) -> None:
+    tallies = Tallies(stores.tallies)
+    other = stores.jobs.add(new_job())
+    stores.jobs.transition(other.id, JobState.RUNNING, at=now())
+    stores.jobs.station_done(other.id, 0, now(), {})
+    stores.jobs.transition(other.id, JobState.CANCELLED, at=now())
+    job = stores.jobs.add(new_job())
+
+    def stations() -> tuple[int, int]:
+        """Stations by this process, and by one that starts now."""
+        anew = Tallies(stores.tallies)
+        for each in (tallies, anew):
+            each.update()
+        return tallies.stations, anew.stations
+
+    def moved(to: JobState, **more: Any) -> None:
+        stores.jobs.transition(job.id, to, at=now(), **more)
+
+    def station(index: int) -> None:
+        stores.jobs.station_done(job.id, index, now(), {})
+
+    moved(JobState.RUNNING)
+    station(0)
+    station(1)
+    assert stations() == (3, 3)
+    moved(JobState.FAILED, failure=Failure("StorageFull", "the disk is full"))
+    assert stations() == (3, 3)
+    stores.jobs.resume(job.id, now())
+    assert stations() == (3, 3)
+    moved(JobState.RUNNING)
+    station(2)
+    assert stations() == (4, 4)
+    moved(JobState.FAILED, failure=Failure("StorageFull", "the disk is full"))
+    assert stations() == (4, 4)
+    stores.jobs.resume(job.id, now())
+    moved(JobState.RUNNING)
+    moved(JobState.SUCCEEDED, verdict=Verdict.PASS)
+    assert stations() == (4, 4)

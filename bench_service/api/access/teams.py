@@ -26,6 +26,12 @@ def _of_bench(bench_id: str, service: Service, me: Me) -> None:
         require_team(me, service.queues.team_of_bench(bench_id), f"bench {bench_id}")
 
 
+def _of_lease(bench_id: str, lease_id: str, service: Service, me: Me) -> None:
+    if not me.in_every_team:
+        lease = service.manual.lease(bench_id, lease_id)
+        require_team(me, service.queues.team_of(lease.reservation), f"manual lease {lease_id}")
+
+
 def _of_campaign(name: str, service: Service, me: Me) -> None:
     require_team(me, service.campaigns.team_of(name), f"campaign {name}")
 
@@ -44,6 +50,8 @@ TeamOfReservation = Depends(_of_reservation)
 """Refuses another team's reservation."""
 TeamOfBench = Depends(_of_bench)
 """Refuses a bench that another team has reserved."""
+TeamOfLease = Depends(_of_lease)
+"""Refuses a lease of manual mode whose reservation is another team's; reservations made later change nothing."""
 TeamOfCampaign = Depends(_of_campaign)
 """Refuses to change another team's campaign."""
 TeamOfRun = Depends(_of_run)

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 from fastapi import Body, Response
 
-from bench_service.api.access.teams import TeamOfBench
+from bench_service.access.service import require_team
+from bench_service.api.access.teams import TeamOfBench, TeamOfLease
 from bench_service.api.http.dependencies import After, ClientName, IdempotencyKey, Limit, Me, ProvenName, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.manual.schemas import (
@@ -46,10 +47,12 @@ def begin_manual(
 ) -> LeaseView:
     """Begin manual mode on an idle bench. No job starts there before the lease has ended and the bench is safe.
 
-    It is refused while a job runs, while the bench is stopped, and where another holder's reservation holds.
+    It is refused while a job runs, while the bench is stopped, and where another holder's reservation holds. Under a
+    reservation, members of its team begin, command and end it.
     """
+    require_team(me, service.queues.team_of(body.reservation), f"reservation {body.reservation}")
     holder = proven or body.by or client
-    asked = copied(ManualRequest, body, bench=bench_id, holder=holder, proven=proven is not None, team=me.team)
+    asked = copied(ManualRequest, body, bench=bench_id, holder=holder, proven=proven is not None)
     lease = service.manual.begin(asked, key)
     response.headers["Location"] = f"/api/v1/benches/{bench_id}/manual/{lease.id}"
     return LeaseView.of(lease)
@@ -77,7 +80,7 @@ def read_manual(bench_id: str, lease_id: str, service: Service) -> LeaseView:
     return LeaseView.of(service.manual.lease(bench_id, lease_id))
 
 
-@router.post("/{lease_id}/renew", responses=problems(404, 409, 413, 507), dependencies=[TeamOfBench])
+@router.post("/{lease_id}/renew", responses=problems(404, 409, 413, 507), dependencies=[TeamOfLease])
 def renew_manual(
     bench_id: str, lease_id: str, body: Renewal, service: Service, client: ClientName, proven: ProvenName
 ) -> LeaseView:
@@ -85,7 +88,7 @@ def renew_manual(
     return LeaseView.of(service.manual.renew(bench_id, lease_id, body.minutes, proven or body.by or client))
 
 
-@router.post("/{lease_id}/end", responses=problems(404, 413, 507), dependencies=[TeamOfBench])
+@router.post("/{lease_id}/end", responses=problems(404, 413, 507), dependencies=[TeamOfLease])
 def end_manual(
     bench_id: str,
     lease_id: str,
@@ -103,7 +106,7 @@ def end_manual(
     "/{lease_id}/demands",
     status_code=202,
     responses=problems(404, 409, 413, 507),
-    dependencies=[TeamOfBench],
+    dependencies=[TeamOfLease],
 )
 def demand_by_hand(
     bench_id: str,

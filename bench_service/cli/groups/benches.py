@@ -126,7 +126,9 @@ def release(
 
 
 def bench_of(client: "httpx.Client", settings: Settings, bench: str | None) -> str:
-    """Return the bench that is meant: the given one, the only one, or that of the settings. Raises `Refused`."""
+    """Return the id of the bench that a command is for: the given one, the only one, or that of the settings. Raises
+    `Refused`.
+    """
     if bench is not None:
         return bench
     known = [one["id"] for one in answer(client, "GET", "/api/v1/benches").json()]
@@ -142,7 +144,7 @@ def _only_stop(stops: list[dict[str, Any]], bench: str) -> str:
         return stops[0]["id"]
     if not stops:
         raise Refused(f"bench {bench} is not stopped: there is nothing to release")
-    named = "; ".join(f"{stop['id']}: {stop['reason']}" for stop in stops)
+    named = "; ".join(f"`bench release {stop['id']} --remark … --by …` ({stop['reason']})" for stop in stops)
     raise Refused(f"bench {bench} has several stops; name the one to release: {named}")
 
 

@@ -1,14 +1,12 @@
 """The HTTP server, in this thread or in one of its own."""
 
 import errno
-import signal
 import socket
 import sys
 import threading
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
@@ -19,6 +17,7 @@ from bench_service.api.http.late_routes import LateRoutes
 from bench_service.app import create_app, open_service
 from bench_service.cli.processes.allocator import limit_allocator
 from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
+from bench_service.cli.processes.ending import calling_at_end
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
 from bench_service.cli.refusal import Refused
@@ -38,14 +37,19 @@ GRACE_S = 3
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server, with a longer queue of connections, and exit code 0 after an orderly end on SIGTERM."""
+    """uvicorn's server, with a longer queue of connections, and exit code 0 after an orderly end on SIGTERM or SIGHUP.
 
-    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Shut down in order on SIGTERM; uvicorn itself would raise it again, and no clean-up at exit would run."""
-        if sig == signal.SIGTERM:
-            self.should_exit = True
-        else:
-            super().handle_exit(sig, frame)
+    uvicorn itself does not know SIGHUP, and would raise SIGTERM again: no clean-up at exit would run.
+    """
+
+    def end(self) -> None:
+        """Shut down in order; from any thread."""
+        self.should_exit = True
+
+    @contextmanager
+    def capture_signals(self) -> Generator[None]:
+        with super().capture_signals(), calling_at_end(self.end):
+            yield
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
@@ -61,9 +65,21 @@ def ready(
     `level`: from which on lines are logged, where the settings do not say.
     Raises `Refused` for an address that it may not listen on, `Misconfigured` for a token that cannot be used, and what
     `open_service` raises, before any thread or signal handler is there. Where the job engine does not start the server
-    ends, and `NotDriving` is raised at the end of the block.
+    ends, and `NotDriving` is raised at the end of the block. A SIGTERM or SIGHUP that comes while the service is being
+    opened ends the server once it runs; one that comes while it is closed, and its bench made safe, changes nothing.
     """
-    with _opened(settings, drive, socket_file, level) as (server, service, late):
+    servers: list[_Server] = []
+    early = threading.Event()
+
+    def end() -> None:
+        early.set()
+        for server in servers:
+            server.end()
+
+    with calling_at_end(end), _opened(settings, drive, socket_file, level) as (server, service, late):
+        servers.append(server)
+        if early.is_set():
+            server.end()
         yield server
         _check_start(service, late)
 
@@ -71,7 +87,7 @@ def ready(
 @contextmanager
 def _opened(
     settings: Settings, drive: bool, socket_file: Path | None, level: str
-) -> Generator[tuple[uvicorn.Server, BenchService, LateRoutes]]:
+) -> Generator[tuple[_Server, BenchService, LateRoutes]]:
     set_up(settings, level)
     sys.setswitchinterval(SWITCH_S)
     protect(settings)
@@ -81,17 +97,14 @@ def _opened(
         check_address(settings)
     rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)
 
-    def end() -> None:
-        server.should_exit = True
-
-    late = LateRoutes(end)
+    late = LateRoutes(lambda: server.end())
     with ExitStack() as closing:
         with no_collection():
             service = open_service(settings, closing, drive, apart=socket_file is None)
             max_bytes, proxies = int(settings.max_import_mb * 1e6), Proxies.of(settings)
             app = create_app(service, max_bytes, closing.close, rules, proxies, late)
             server = _server(settings, socket_file, app)
-        service.at_failed_start(end)
+        service.at_failed_start(server.end)
         yield server, service, late
 
 

@@ -12,7 +12,7 @@ from bench_service.drivers.devices.chamber_rules import (
 from bench_service.drivers.devices.wire import Greeting, line_times
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import NonNegative, WireChamber
-from bench_service.drivers.link.exchange import Ask, Question
+from bench_service.drivers.link.exchange import Ask, Request
 from bench_service.drivers.link.framing import Framing
 from bench_service.drivers.link.line import DeviceLine
 from bench_service.drivers.protocols import ascii2
@@ -47,7 +47,7 @@ class Ascii2Section(WireChamber):
 
     @property
     def layout(self) -> Layout:
-        """Layout of the lines. Raises `ValueError`."""
+        """Layout of the lines that the section describes. Raises `ValueError` for a layout that contradicts itself."""
         return Layout(
             self.bus_address,
             self.analogue,
@@ -60,12 +60,12 @@ class Ascii2Section(WireChamber):
 
 
 class Ascii2Chamber:
-    """Chamber whose every write sets all fields: it is read, changed in one place, and written."""
+    """Chamber over ASCII-2, whose every write sets all fields: it is read, changed in one place, and written."""
 
     def __init__(self, section: Ascii2Section, context: DriverContext) -> None:
         self._section, self._clock, self._layout = section, context.clock, section.layout
-        self._state = Question(ascii2.read_request(self._layout), "its state", lambda a: ascii2.state(self._layout, a))
-        identity = Question(self._state.data, "its state", lambda a: _identity(ascii2.state(self._layout, a)))
+        self._state = Request(ascii2.read_request(self._layout), "its state", lambda a: ascii2.state(self._layout, a))
+        identity = Request(self._state.data, "its state", lambda a: _identity(ascii2.state(self._layout, a)))
         self._greeting = Greeting("chamber", identity, self._first_words, context.note)
         self._line = DeviceLine(
             "chamber", section.address, Framing(ascii2.ENDING), self._greeting, line_times(section, section.after_set_s)
@@ -82,18 +82,20 @@ class Ascii2Chamber:
         return Found(await self.identify(), reading.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Shape of its state: the protocol has no identity of its own."""
+        """Return the shape of the chamber's state as its model: the protocol has no identity of its own."""
         return await self._line.ask(self._greeting.identity)
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
-        """Go to an air temperature; see the port."""
+        """Set air temperature and ramp, start, and read back. Raises `OutOfRange`, `DeviceFault` for an open door or an
+        alarm. Implements `Chamber.command`.
+        """
         require_allowed(self.limits, temperature_c, ramp_c_min)
         state = await self._line.ask(self._state)
         require_fit(state.bit(self._layout.door), state.bit(self._layout.alarm))
         await self._lead(state, temperature_c, ramp_c_min, start=True)
 
     async def read(self) -> ChamberReading:
-        """Read the chamber; see the port."""
+        """Return air temperature, set point (None: it stands still), door and alarm. Implements `Chamber.read`."""
         layout, state = self._layout, await self._line.ask(self._state)
         running = state.bit(layout.start)
         target = state.set_points[layout.temperature] if running else None
@@ -110,7 +112,9 @@ class Ascii2Chamber:
         )
 
     async def make_safe(self) -> None:
-        """Lead a running chamber as `on_safe` says; see the port."""
+        """Bring a running chamber into the state that `on_safe` names; one that stands still gets no demand. Implements
+        `Chamber.make_safe`.
+        """
         state = await self._line.ask(self._state)
         if not state.bit(self._layout.start):
             return
@@ -130,7 +134,7 @@ class Ascii2Chamber:
         if self._section.gradients:
             data = ascii2.gradient_request(self._layout, ramp_c_min, ramp_c_min)
             name = f"ramps of {ramp_c_min:g} K/min"
-            await self._line.ask(Question(data, name, ascii2.acknowledged, demand=True))
+            await self._line.ask(Request(data, name, ascii2.acknowledged, demand=True))
         elif ramp_c_min < self.limits.ramp_c_min:
             raise DeviceFault(
                 f"ramp_c_min = {ramp_c_min:g}: this chamber takes no ramp (gradients = false), only its own, "
@@ -146,7 +150,7 @@ class Ascii2Chamber:
 
     async def _write(self, points: list[float] | tuple[float, ...], switches: str, name: str) -> State:
         data = ascii2.write_request(self._layout, points, switches)
-        await self._line.ask(Question(data, name, ascii2.acknowledged, demand=True))
+        await self._line.ask(Request(data, name, ascii2.acknowledged, demand=True))
         found = await self._line.ask(self._state)
         if found.digital[: self._layout.digital] != switches[: self._layout.digital]:
             raise DeviceFault(f"the chamber was given {name} and its switches read back as {found.digital}")

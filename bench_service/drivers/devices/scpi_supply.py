@@ -9,7 +9,7 @@ from bench_service.drivers.answers import Refusal
 from bench_service.drivers.devices.wire import Greeting, accepted, line_times
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import Positive, WireSupply
-from bench_service.drivers.link.exchange import Ask, Question
+from bench_service.drivers.link.exchange import Ask, Request
 from bench_service.drivers.link.framing import Framing
 from bench_service.drivers.link.line import DeviceLine
 from bench_service.drivers.protocols import scpi
@@ -37,12 +37,12 @@ class ScpiSection(WireSupply):
 
 
 class ScpiSupply:
-    """Power supply that is asked for its errors after every set, and whose settings are read back."""
+    """Power supply over SCPI, which is asked for its errors after every set, and whose settings are read back."""
 
     def __init__(self, section: ScpiSection, context: DriverContext) -> None:
         self._section, self._clock = section, context.clock
         self._dialect = scpi.Dialect(section.channel, section.trip_query, section.mode_query)
-        identity = Question(scpi.line(self._dialect, scpi.IDENTITY_QUERY), "its identity", _identity)
+        identity = Request(scpi.line(self._dialect, scpi.IDENTITY_QUERY), "its identity", _identity)
         self._greeting = Greeting("supply", identity, self._empty_errors, context.note)
         self._line = DeviceLine(
             "supply", section.address, Framing(self._dialect.ending), self._greeting, line_times(section)
@@ -59,11 +59,13 @@ class ScpiSupply:
         return Found(await self.identify(), reading.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Ask for the identity; see the port."""
+        """Ask for maker, model, serial and firmware, and return them."""
         return await self._line.ask(self._greeting.identity)
 
     async def set_output(self, voltage_v: float, current_a: float) -> None:
-        """Set voltage and current limit; see the port. The lower setting of the current comes first."""
+        """Set voltage and current limit, and read them back; the lower setting of the current comes first. Raises
+        `OutOfRange`, `DeviceFault`. Implements `Supply.set_output`.
+        """
         if violations := self.limits.violations(voltage_v, current_a):
             raise OutOfRange("; ".join(violations))
         await self._set(scpi.set_current(self._dialect, current_a), f"a current limit of {current_a:g} A")
@@ -76,7 +78,9 @@ class ScpiSupply:
         self._wanted = (voltage_v, current_a)
 
     async def switch_on(self) -> None:
-        """Switch the output on; see the port. One that has tripped stays off: some clear a trip by that."""
+        """Switch the output on and check that it is. Raises `DeviceFault`. One that has tripped stays off: some
+        supplies clear a trip by that. Implements `Supply.switch_on`.
+        """
         if await self._tripped():
             raise DeviceFault("the supply's protection has tripped: a person must reset it")
         if await self._query("OUTP?", scpi.switch):
@@ -85,12 +89,14 @@ class ScpiSupply:
         await self._switch(True)
 
     async def switch_off(self) -> None:
-        """Switch the output off; see the port."""
+        """Switch the output off, if it is on, and check that it is off. Implements `Supply.switch_off`."""
         if await self._query("OUTP?", scpi.switch):
             await self._switch(False)
 
     async def read(self) -> SupplyReading:
-        """Measure the output and read its state; see the port."""
+        """Return measured voltage and current, the settings, whether the output is on, and status words. Implements
+        `Supply.read`.
+        """
         on = await self._query("OUTP?", scpi.switch)
         tripped = await self._tripped()
         set_v, set_a = await self._query("VOLT?", scpi.value), await self._query("CURR?", scpi.value)
@@ -106,7 +112,7 @@ class ScpiSupply:
         return SupplyReading(self._clock.now_s(), on, voltage, current, mode == "CC", tripped, set_v, set_a, status)
 
     async def make_safe(self) -> None:
-        """Switch the output off; see the port."""
+        """Switch the output off and check that it is off. Implements `Supply.make_safe`."""
         await self.switch_off()
 
     def close(self) -> None:
@@ -125,19 +131,19 @@ class ScpiSupply:
 
     async def _query(self, words: str, read: Callable[[bytes], T]) -> T:
         data = scpi.line(self._dialect, scpi.header(self._dialect, words))
-        return await accepted(self._line.ask(Question(data, words, read)), "supply", words)
+        return await accepted(self._line.ask(Request(data, words, read)), "supply", words)
 
     async def _set(self, statement: str, name: str) -> None:
         """Send a set and the query of its error in one piece, so that they share a line; neither is sent twice."""
         data = scpi.line(self._dialect, statement) + scpi.line(self._dialect, scpi.ERROR_QUERY)
-        question = Question(data, name, scpi.no_error, demand=True)
-        await accepted(self._line.ask(question), "supply", name)
+        request = Request(data, name, scpi.no_error, demand=True)
+        await accepted(self._line.ask(request), "supply", name)
 
     def _empty_errors(self, ask: Ask) -> None:
         """Read old errors away at a new line, so that none is taken for that of a later set."""
-        question = Question(scpi.line(self._dialect, scpi.ERROR_QUERY), "its old errors", scpi.error)
+        request = Request(scpi.line(self._dialect, scpi.ERROR_QUERY), "its old errors", scpi.error)
         for _ in range(MOST_ERRORS):
-            if ask(question)[0] == 0:
+            if ask(request)[0] == 0:
                 return
         raise Refusal(f"its error queue does not come to an end within {MOST_ERRORS} errors")
 

@@ -15,7 +15,7 @@ from bench_service.drivers.devices.chamber_rules import (
 from bench_service.drivers.devices.wire import Greeting, accepted, line_times
 from bench_service.drivers.interface.driver import Bound, DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import NonNegative, Positive, WireChamber
-from bench_service.drivers.link.exchange import Ask, Question
+from bench_service.drivers.link.exchange import Ask, Request
 from bench_service.drivers.link.framing import Framing
 from bench_service.drivers.link.line import DeviceLine
 from bench_service.drivers.protocols import simserv
@@ -44,17 +44,17 @@ class SimservSection(WireChamber):
 
 
 class SimservChamber:
-    """Chamber whose set point is the final one: the controller makes the ramp by its gradients."""
+    """Chamber over SIMSERV, whose set point is the final one: the controller makes the ramp by its gradients."""
 
     def __init__(self, section: SimservSection, context: DriverContext) -> None:
         self._section, self._clock = section, context.clock
         self._variable = str(section.variable)
         self._own: tuple[Bound, ...] = ()
         self._door: int | None = None
-        self._first = Question(
+        self._first = Request(
             simserv.request(Command.INFORMATION, [str(Information.TYPE.value)]), "its type", simserv.text_of
         )
-        identity = Question(self._first.data, "its type", lambda answer: DeviceIdentity(model=simserv.text_of(answer)))
+        identity = Request(self._first.data, "its type", lambda answer: DeviceIdentity(model=simserv.text_of(answer)))
         self._greeting = Greeting("chamber", identity, self._first_words, context.note)
         self._line = DeviceLine(
             "chamber",
@@ -75,13 +75,15 @@ class SimservChamber:
         return Found(await self.identify(), reading.status, self._own)
 
     async def identify(self) -> DeviceIdentity:
-        """Ask for type, serial and software; see the port."""
+        """Ask for type, serial and software version, and return them."""
         model = await self._ask(Command.INFORMATION, [str(Information.TYPE.value)], simserv.text_of)
         serial = await self._ask(Command.INFORMATION, [str(Information.SERIAL.value)], simserv.text_of)
         return DeviceIdentity("", model, serial)
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
-        """Go to an air temperature; see the port. Gradients, then the set point, then the start, each read back."""
+        """Set gradients, then the set point, then start, and read each back. Raises `OutOfRange`, `DeviceFault`.
+        Implements `Chamber.command`.
+        """
         require_allowed(limits_of(self._section.limits), temperature_c, ramp_c_min)
         status = await self._status()  # greets, and so reads the chamber's own limits
         require_allowed(self.limits, temperature_c, ramp_c_min)
@@ -91,7 +93,7 @@ class SimservChamber:
             await self._run(True)
 
     async def read(self) -> ChamberReading:
-        """Read the chamber; see the port."""
+        """Return air temperature, set point (None: it stands still), door and alarm. Implements `Chamber.read`."""
         status = await self._status()
         air = await self._ask(Command.ACTUAL, [self._variable], simserv.number_of)
         target = await self._ask(Command.GET_SET_POINT, [self._variable], simserv.number_of)
@@ -106,7 +108,9 @@ class SimservChamber:
         )
 
     async def make_safe(self) -> None:
-        """Lead a running chamber as `on_safe` says; see the port. One that stands still gets no demand."""
+        """Bring a running chamber into the state that `on_safe` names; one that stands still gets no demand. Implements
+        `Chamber.make_safe`.
+        """
         status = await self._status()
         if status & ChamberStatus.RUNNING:
             await obey_on_safe(self._section, self.limits, lambda: self._run(False), self._lead)
@@ -156,21 +160,19 @@ class SimservChamber:
 
     async def _ask(self, command: Command, arguments: list[str], read: Callable[[bytes], T]) -> T:
         name = f"{command.name.lower().replace('_', ' ')} ({command.value})"
-        return await accepted(
-            self._line.ask(Question(simserv.request(command, arguments), name, read)), "chamber", name
-        )
+        return await accepted(self._line.ask(Request(simserv.request(command, arguments), name, read)), "chamber", name)
 
     async def _set(self, command: Command, arguments: list[str], name: str) -> None:
-        question = Question(simserv.request(command, arguments), name, simserv.accepted, demand=True)
-        await accepted(self._line.ask(question), "chamber", name)
+        request = Request(simserv.request(command, arguments), name, simserv.accepted, demand=True)
+        await accepted(self._line.ask(request), "chamber", name)
 
     def _first_words(self, ask: Ask) -> None:
         """Status, own limits and the place of the door, at each new line."""
 
         def put(command: Command, *arguments: str) -> float:
-            return ask(Question(simserv.request(command, arguments), command.name.lower(), simserv.number_of))
+            return ask(Request(simserv.request(command, arguments), command.name.lower(), simserv.number_of))
 
-        ask(Question(simserv.request(Command.STATUS), "its status", simserv.status_of))
+        ask(Request(simserv.request(Command.STATUS), "its status", simserv.status_of))
         self._own = (
             Bound("limits.minimum_c", put(Command.INPUT_MINIMUM, self._variable)),
             Bound("limits.maximum_c", put(Command.INPUT_MAXIMUM, self._variable)),
@@ -179,7 +181,7 @@ class SimservChamber:
         if self._section.door_input:
             for index in range(1, min(MOST_INPUTS, int(put(Command.DIGITAL_INPUT_COUNT))) + 1):
                 request = simserv.request(Command.DIGITAL_INPUT_NAME, [str(index)])
-                if ask(Question(request, "an input's name", simserv.text_of)) == self._section.door_input:
+                if ask(Request(request, "an input's name", simserv.text_of)) == self._section.door_input:
                     self._door = index
 
 

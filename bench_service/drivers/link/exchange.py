@@ -1,4 +1,4 @@
-"""Questions and answers over one line, and what happens when the line is lost in between. Blocking; knows no thread.
+"""Requests and answers over one line, and what happens when the line is lost in between. Blocking; knows no thread.
 
 Rules: a request goes out on a line that is in step, which means that every earlier answer was read or the connection
 was given up. A read may be repeated over a new connection, a demand never. After a reconnect the device's identity and
@@ -24,8 +24,8 @@ AGAIN_S = 0.1
 
 
 @dataclass(frozen=True)
-class Question(Generic[T]):
-    """Bytes to send, and the meaning of the answer."""
+class Request(Generic[T]):
+    """A request to a device: the bytes to send, and the function that reads the answer."""
 
     data: bytes
     name: str
@@ -40,7 +40,7 @@ class Question(Generic[T]):
 
 @dataclass(frozen=True)
 class LineTimes:
-    """Times of a line [s]."""
+    """Time-outs of a line [s]: of an answer, of a whole request, of a connection, and of a rest after a demand."""
 
     answer_s: float = 2.0
     """Longest time from a request to its whole answer."""
@@ -52,16 +52,16 @@ class LineTimes:
 
 
 class Framer(Protocol):
-    """Where one answer ends; see `framing`."""
+    """Finds where one answer ends in what has arrived. Interface; see `framing`."""
 
     def take(self, buffer: bytearray) -> bytes | None: ...
 
 
 class Greeting(Protocol):
-    """First words on each new connection: identity, then status."""
+    """First requests on each new connection: identity, then status. Interface of the drivers."""
 
     @property
-    def identity(self) -> Question[Any]:
+    def identity(self) -> Request[Any]:
         """Request for the identity; its `read` refuses the answer to any other request."""
         ...
 
@@ -71,9 +71,9 @@ class Greeting(Protocol):
 
 
 class Ask(Protocol):
-    """Send a request on the new connection, without a second try."""
+    """Function that sends a request on the new connection, without a second try, and returns the answer's value."""
 
-    def __call__(self, question: Question[T]) -> T: ...
+    def __call__(self, request: Request[T]) -> T: ...
 
 
 class _Lost(Exception):
@@ -82,9 +82,11 @@ class _Lost(Exception):
 
 @dataclass
 class LineCounts:
-    """Counts of what has happened to a line; for tests, metrics and messages."""
+    """Counts of what has happened to a line: requests, connections, silences, cuts, surplus bytes; for tests, metrics
+    and messages.
+    """
 
-    questions: int = 0
+    requests: int = 0
     connections: int = 0
     silences: int = 0
     cuts: int = 0
@@ -93,7 +95,9 @@ class LineCounts:
 
 
 class Exchange:
-    """Conversation with one device, which reconnects where that is allowed."""
+    """Requests and answers with one device over one line, which reconnects where that is allowed. Blocking, for one
+    thread.
+    """
 
     def __init__(self, device: str, address: Address, framer: Framer, greeting: Greeting, times: LineTimes) -> None:
         self.device, self.address, self.times = device, address, times
@@ -106,22 +110,24 @@ class Exchange:
         self._greeted = False
         self.counts = LineCounts()
 
-    def ask(self, question: Question[T], until: float) -> T:
-        """Ask until a moment of the monotonic clock. Raises `Disconnected`, `DeviceBusy`, `Refusal`."""
+    def ask(self, request: Request[T], until: float) -> T:
+        """Send a request and wait for the value of its answer, until a moment of the monotonic clock. Raises
+        `Disconnected`, `DeviceBusy`, `Refusal`.
+        """
         self._connect(until)
         try:
-            return self._once(question, until)
+            return self._once(request, until)
         except _Lost as lost:
             self._give_up()
-            if question.demand:
+            if request.demand:
                 raise Disconnected(
-                    f"{self._named()}: {lost}; whether {question.name} was carried out is not known, and it is not "
+                    f"{self._named()}: {lost}; whether {request.name} was carried out is not known, and it is not "
                     "sent again"
                 ) from None
-            log.warning("%s: %s; %s is sent again over a new connection", self._named(), lost, question.name)
+            log.warning("%s: %s; %s is sent again over a new connection", self._named(), lost, request.name)
         self._connect(until)
         try:
-            return self._once(question, until)
+            return self._once(request, until)
         except _Lost as lost:
             self._give_up()
             raise Disconnected(f"{self._named()} does not answer, also not to a second request: {lost}") from None
@@ -205,7 +211,7 @@ class Exchange:
         stale, self._stale = self._stale, False
         try:
             identity = self._once(self._greeting.identity, until, leave_out_others=stale)
-            self._greeting.check(identity, lambda question: self._once(question, until))
+            self._greeting.check(identity, lambda request: self._once(request, until))
         except _Lost as lost:
             self._stale = stale
             self._give_up()
@@ -217,7 +223,7 @@ class Exchange:
             self.close()
             raise
 
-    def _once(self, question: Question[T], until: float, leave_out_others: bool = False) -> T:
+    def _once(self, request: Request[T], until: float, leave_out_others: bool = False) -> T:
         """Send a request and read its answer. Raises `_Lost`."""
         transport = self._transport
         if transport is None:
@@ -225,36 +231,36 @@ class Exchange:
         pause = self._not_before - wall_clock.monotonic_s()
         if pause > 0.0:
             wall_clock.pause(pause)
-        self.counts.questions += 1
+        self.counts.requests += 1
         until = min(until, wall_clock.monotonic_s() + self.times.answer_s)
         try:
-            transport.send(question.data)
+            transport.send(request.data)
             while True:
-                answer = self._answer(transport, question, until) if question.answered else b""
+                answer = self._answer(transport, request, until) if request.answered else b""
                 try:
-                    return question.read(answer)
+                    return request.read(answer)
                 except BadAnswer as bad:
                     if not leave_out_others:
-                        raise _Lost(f"the answer to {question.name} is none: {bad}") from None
+                        raise _Lost(f"the answer to {request.name} is none: {bad}") from None
         except LineCut as cut:
             self.counts.cuts += 1
-            raise _Lost(f"the connection was lost at {question.name}: {cut}") from None
+            raise _Lost(f"the connection was lost at {request.name}: {cut}") from None
         finally:
-            if question.demand and self.times.after_demand_s > 0.0:
+            if request.demand and self.times.after_demand_s > 0.0:
                 self._not_before = wall_clock.monotonic_s() + self.times.after_demand_s
 
-    def _answer(self, transport: Transport, question: Question[T], until: float) -> bytes:
+    def _answer(self, transport: Transport, request: Request[T], until: float) -> bytes:
         """Read one answer. Raises `_Lost`, `LineCut`."""
         while True:
             try:
                 answer = self._framer.take(self._buffer)
             except NoFrame as bad:
-                raise _Lost(f"the answer to {question.name} has no end: {bad}") from None
+                raise _Lost(f"the answer to {request.name} has no end: {bad}") from None
             if answer is not None:
                 return answer
             left = until - wall_clock.monotonic_s()
             if left <= 0.0:
                 self.counts.silences += 1
                 half = f", only {shown(bytes(self._buffer))} came" if self._buffer else ""
-                raise _Lost(f"no answer to {question.name} within {self.times.answer_s:g} s{half}")
+                raise _Lost(f"no answer to {request.name} within {self.times.answer_s:g} s{half}")
             self._buffer += transport.receive(left)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from bench_service import wall_clock
 from bench_service.drivers.interface.address import Address
-from bench_service.drivers.link.exchange import Exchange, Framer, Greeting, LineCounts, LineTimes, Question
+from bench_service.drivers.link.exchange import Exchange, Framer, Greeting, LineCounts, LineTimes, Request
 from procedures.bench.errors import Disconnected
 
 T = TypeVar("T")
@@ -17,7 +17,7 @@ WAITING = 64
 
 
 class _Asked(NamedTuple):
-    question: Question[Any]
+    request: Request[Any]
     until: float
     answer: "Future[Any]"
 
@@ -42,11 +42,13 @@ class DeviceLine:
         """Counts of what has happened to the line."""
         return self._exchange.counts
 
-    async def ask(self, question: Question[T], within_s: float | None = None) -> T:
-        """Ask and wait for the value of the answer. Raises `Disconnected`, `DeviceBusy`, `Refusal`."""
-        return await asyncio.wrap_future(self._put(question, within_s))
+    async def ask(self, request: Request[T], within_s: float | None = None) -> T:
+        """Send a request and wait, without holding the loop, for the value of the answer. Raises `Disconnected`,
+        `DeviceBusy`, `Refusal`.
+        """
+        return await asyncio.wrap_future(self._put(request, within_s))
 
-    def _put(self, question: Question[T], within_s: float | None) -> "Future[T]":
+    def _put(self, request: Request[T], within_s: float | None) -> "Future[T]":
         times = self._exchange.times
         until = wall_clock.monotonic_s() + (times.deadline_s if within_s is None else within_s)
         answer: Future[T] = Future()
@@ -57,7 +59,7 @@ class DeviceLine:
                 self._thread = threading.Thread(target=self._run, name=f"line {self._named}", daemon=True)
                 self._thread.start()
             try:
-                self._queue.put_nowait(_Asked(question, until, answer))
+                self._queue.put_nowait(_Asked(request, until, answer))
             except queue.Full:
                 raise Disconnected(f"{self._named} does not answer: {WAITING} requests wait for its answer") from None
         return answer
@@ -68,11 +70,11 @@ class DeviceLine:
                 continue
             if asked.until <= wall_clock.monotonic_s():
                 asked.answer.set_exception(
-                    Disconnected(f"{self._named} did not come to {asked.question.name} in time; it was not sent")
+                    Disconnected(f"{self._named} did not come to {asked.request.name} in time; it was not sent")
                 )
                 continue
             try:
-                asked.answer.set_result(self._exchange.ask(asked.question, asked.until))
+                asked.answer.set_result(self._exchange.ask(asked.request, asked.until))
             except BaseException as failure:
                 asked.answer.set_exception(failure)
         self._exchange.close()
@@ -94,7 +96,7 @@ class DeviceLine:
         self._exchange.stop()
 
     def ended(self, within_s: float) -> bool:
-        """Wait for the thread after `close`; True if it has ended."""
+        """Wait for the thread after `close`, at most `within_s`; return True if it has ended."""
         if self._thread is not None:
             self._thread.join(within_s)
         return self._thread is None or not self._thread.is_alive()

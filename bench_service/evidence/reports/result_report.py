@@ -40,7 +40,7 @@ SIMPLE = "simple acceptance, the uncertainty of a value is not taken off"
 
 @dataclass(frozen=True)
 class ResultReport:
-    """A result with everything that its report is made of."""
+    """A result with all that its printed report is made of: its job, its calibrations, and those found before."""
 
     result: StoredResult
     job: Job | None
@@ -51,13 +51,15 @@ class ResultReport:
 
 
 def gathered(stores: EvidenceStores, result: StoredResult, job: Job | None) -> ResultReport:
-    """Gather what a result's report needs."""
+    """Read what a result's report needs from the stores."""
     given = stores.calibrations.of_results([result.id])
     return ResultReport(result, job, tuple(given), calibration_parts.found_before(stores, result))
 
 
 def result_report(stores: EvidenceStores, catalogue: Catalogue, of: ResultReport) -> PrintedDocument:
-    """The report of a result: identity, mounting, instruments, conditions, results, plots, verdict, people, hashes."""
+    """Return the printed report of a result: identity, mounting, instruments, conditions, results, plots, verdict,
+    people, hashes.
+    """
     result, attached = of.result, _attached(of.result)
     blocks = [*_head(of), *context_parts.identity(result.context, result.unit or "none")]
     blocks += record_parts.found_and_left(stores, catalogue, result, of.found, of.calibrations, of.job)
@@ -123,7 +125,7 @@ def _head(of: ResultReport) -> Iterator[Block]:
 
 
 def verdict_blocks(result: StoredResult) -> Iterator[Block]:
-    """The verdict with its decision rule, its checks and the warnings."""
+    """Yield the section on the verdict: its decision rule, its checks and the warnings."""
     yield Heading("Verdict")
     yield Paragraph(f"{result.verdict.value.upper()}. {_rule(result.document)}")
     checks = result.document.get("checks", [])
@@ -142,7 +144,10 @@ def _rule(document: dict[str, Any]) -> str:
 def _checks(checks: list[dict[str, Any]]) -> PrintedTable:
     rows = tuple(_check(c) for c in sorted(checks, key=lambda c: c["passed"]))
     columns = ("", "check", "value", "U", "k", "limit", "unit", "note")
-    note = "U = k·u is the expanded uncertainty; values have its second digit. Conditional: within U of the limit."
+    note = (
+        "U = k·u is the expanded uncertainty; values have its second digit. Conditional: within U of the limit. "
+        "Inconclusive: nothing was observed, and what it stays below is outside the limit."
+    )
     return PrintedTable("Checks", columns, rows, (2, 3, 4), note)
 
 
@@ -157,12 +162,12 @@ def _check(c: dict[str, Any]) -> tuple[str, ...]:
     return (
         decision.get("outcome") or ("pass" if c["passed"] else "fail"),
         c["name"],
-        to_uncertainty(c["value"], expanded),
+        ("< " if c.get("bound") else "") + to_uncertainty(c["value"], expanded),
         "–" if expanded is None else two_digits(expanded),
         "–" if expanded is None else f"{factor:.3g}",
         " and ".join(bounds),
         limit["unit"],
-        c.get("note", ""),
+        "; ".join(filter(None, (c.get("note", ""), limit.get("source") and f"limit: {limit['source']}"))),
     )
 
 

@@ -11,7 +11,8 @@ FORMAT, VERSION = "bench-calibration", 1
 INVERSE_NAMES = tuple(name.replace("b_", "c_").replace("K", "A") for name in COEFFICIENT_NAMES)
 FORMULA = {
     "forward": "U = b + K·v + n",
-    "inverse": "v = A·U + c, with A = K⁻¹ and c = −K⁻¹·b; the same as v = A·(U − b)",
+    "inverse": "v = A·U + c of one sample, U·Aᵀ + c of samples in rows, with A = K⁻¹ and c = −K⁻¹·b; "
+    "the same as v = A·(U − b)",
     "U": "nominal output of the channels x, y, z: scale·(raw − offset), an increment divided by the sample period",
     "v": "specific force or angular rate in the orthogonal axes of the frame",
     "K": "row: output channel, column: input axis",
@@ -24,7 +25,7 @@ FRAME = (
 
 
 def own_json(subject: CalibrationSubject) -> str:
-    """The JSON document as text; its numbers are the stored ones to the last bit."""
+    """Return the JSON document as text; its numbers are the stored ones to the last bit."""
     document: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,

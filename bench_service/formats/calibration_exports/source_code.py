@@ -7,7 +7,8 @@ from bench_service.formats.calibration_exports.subject import CalibrationSubject
 from procedures.core.arrays import Array
 
 C_FUNCTION = """
-/* {triad}: {output} -> {input}; u and v may be the same array. */
+/* {triad}: {output} -> {input}, ONE sample a call: of a longer array only its first three numbers are read.
+   u and v may be the same array. Samples in rows: for (i = 0; i < n; i++) correct_{triad}(u[i], v[i]); */
 static const double {triad}_bias[3] = {{{bias}}};
 static const double {triad}_inverse[3][3] = {{
 {rows}
@@ -20,6 +21,21 @@ static void correct_{triad}(const double u[3], double v[3]) {{
     }}
 }}
 """
+PYTHON_HEAD = """
+
+def _corrected(u, bias, inverse):
+    # One sample is a tuple of three numbers; several are a list of samples, or an array whose last axis has length 3.
+    shape = getattr(u, "shape", None)
+    if shape is None and len(u) == 3 and not any(hasattr(one, "__len__") for one in u):
+        x, y, z = (one - zero for one, zero in zip(u, bias))
+        return tuple(row[0] * x + row[1] * y + row[2] * z for row in inverse)
+    if shape is None and len(u) > 0 and all(hasattr(one, "__len__") and len(one) == 3 for one in u):
+        return [_corrected(one, bias, inverse) for one in u]
+    if shape is None or len(shape) == 0 or shape[-1] != 3:
+        found = f"{len(u)} values" if shape is None else f"the shape {tuple(shape)}"
+        raise ValueError(f"u has {found}; it must be one sample (x, y, z) or samples in rows, shape (n, 3)")
+    return (u - list(bias)) @ [list(column) for column in zip(*inverse)]
+"""
 PYTHON_FUNCTION = '''
 
 {upper}_BIAS = ({bias})
@@ -29,15 +45,19 @@ PYTHON_FUNCTION = '''
 
 
 def correct_{triad}(u):
-    """Correct one nominal output (x, y, z) [{output}]; returns (x, y, z) [{input}]."""
-    x, y, z = (u[i] - {upper}_BIAS[i] for i in range(3))
-    return tuple(row[0] * x + row[1] * y + row[2] * z for row in {upper}_INVERSE)
+    """Correct nominal outputs [{output}] to inputs [{input}].
+
+    u is one sample (x, y, z), and a tuple of three comes back; or samples in rows, a list of samples or a numpy array
+    of the shape (n, 3), and as many rows come back. Of a square array of three samples each ROW is a sample. Any other
+    shape is a ValueError.
+    """
+    return _corrected(u, {upper}_BIAS, {upper}_INVERSE)
 '''
 MODEL = "v = A*(U - b), A the inverse of K; U is the nominal output scale*(raw - offset), increments over the period"
 
 
 def c_source(subject: CalibrationSubject) -> str:
-    """C99 header with one function a triad: ``correct_gyro(u, v)`` and ``correct_accelerometer(u, v)``."""
+    """Return a C99 header with one function a triad: ``correct_gyro(u, v)`` and ``correct_accelerometer(u, v)``."""
     guard = "CALIBRATION_" + re.sub(r"[^A-Z0-9]", "_", subject.unit.upper())
     head = [f"/* {line.replace('*/', '* /')} */" for line in (*subject.remarks(), MODEL)]
     functions = [C_FUNCTION.format(**_numbers(t, "    {%s}", ",\n")) for t in subject.triads]
@@ -45,10 +65,12 @@ def c_source(subject: CalibrationSubject) -> str:
 
 
 def python_source(subject: CalibrationSubject) -> str:
-    """Python module with one function a triad; it imports nothing."""
+    """Return a Python module with one function a triad, for one sample or for samples in rows; it imports nothing."""
     head = "\n".join(commented(subject, "#", MODEL))
     rows = "    (%s),"
-    return head + "".join(PYTHON_FUNCTION.format(**_numbers(t, rows, "\n")) for t in subject.triads)
+    return (
+        head + "\n" + PYTHON_HEAD + "".join(PYTHON_FUNCTION.format(**_numbers(t, rows, "\n")) for t in subject.triads)
+    )
 
 
 def _numbers(one: TriadExport, row: str, between: str) -> dict[str, str]:

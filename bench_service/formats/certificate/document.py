@@ -42,7 +42,9 @@ DECISION_RULE = "simple acceptance: the value is compared with its limit, its un
 
 
 def certificate(document: Mapping[str, Any], text: str, laboratory: Laboratory, software: str) -> Element:
-    """The certificate of an exported calibration, unsigned. `text`: the JSON as exported; `software`: its release."""
+    """Return the certificate of an exported calibration as an XML tree, unsigned. `text`: the JSON as exported;
+    `software`: its release. Raises `CertificateRefused`.
+    """
     root = etree.Element(f"{{{DCC}}}digitalCalibrationCertificate", nsmap=SPACES, schemaVersion=VERSION)
     _administrative(_dcc(root, "administrativeData"), document, laboratory, software)
     results = _dcc(root, "measurementResults")

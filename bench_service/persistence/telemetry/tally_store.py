@@ -38,10 +38,11 @@ class SqlTallyStore:
         with self._database.read() as session:
             return tuple(Ending(*row) for row in session.execute(query))
 
-    def stations_of_open_jobs(self) -> int:
+    def stations_of_open_jobs(self) -> dict[str, int]:
         open_states = ("queued", "running", "paused", "interrupted")
+        query = select(JobRow.id, JobRow.stations_done).where(JobRow.state.in_(open_states), JobRow.stations_done > 0)
         with self._database.read() as session:
-            return session.scalar(select(func.sum(JobRow.stations_done)).where(JobRow.state.in_(open_states))) or 0
+            return {row.id: row.stations_done for row in session.execute(query)}
 
     def recorded_bytes(self) -> int:
         listed = (RecordingState.COMPLETE.value, RecordingState.INTERRUPTED.value)
