@@ -18,7 +18,7 @@ from pyarrow import csv
 
 from bench_service.formats.chunk import RAW_BYTES, sample_type
 from bench_service.formats.export_format import ExportFormat
-from bench_service.formats.outbox import Outbox
+from bench_service.formats.written_bytes import WrittenBytes
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
 
@@ -126,7 +126,7 @@ def _batches(schema: Any, blocks: Iterable[RawArray]) -> Iterator[Any]:
 
 
 def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
-    outbox, schema = Outbox(), _schema(part)
+    outbox, schema = WrittenBytes(), _schema(part)
     with pa.ipc.new_stream(pa.PythonFile(outbox, mode="w"), schema) as writer:
         for batch in _batches(schema, blocks):
             writer.write_batch(batch)
@@ -135,7 +135,7 @@ def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
 
 
 def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
-    outbox, schema = Outbox(), _schema(part)
+    outbox, schema = WrittenBytes(), _schema(part)
     with pq.ParquetWriter(
         pa.PythonFile(outbox, mode="w"),
         schema,

@@ -1,4 +1,4 @@
-"""Equivalent degrees of freedom of the Allan family, and chi-square intervals.
+"""Confidence intervals of Allan deviations: equivalent degrees of freedom, and the chi-square interval made from them.
 
 C. A. Greenhall and W. J. Riley, "Uncertainty of Stability Variances Based on Finite Differences", PTTI 2003, the
 combined algorithm; NIST SP 1065, 5.4.1 (edf) and eq. 45 (interval).
