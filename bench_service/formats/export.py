@@ -18,7 +18,7 @@ from pyarrow import csv
 
 from bench_service.formats.chunk import RAW_BYTES, sample_type
 from bench_service.formats.export_format import ExportFormat
-from bench_service.formats.written_bytes import WrittenBytes
+from bench_service.formats.samples_out.written_bytes import WrittenBytes
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
 

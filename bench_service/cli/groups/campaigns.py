@@ -160,7 +160,7 @@ def add_schedule(
     overlap: Annotated[str, typer.Option(help="Starts while the previous run is open: skip or queue")] = "skip",
     server: Server = None,
 ) -> None:
-    """Start a campaign by itself, again and again."""
+    """Add a schedule by which a campaign starts by itself, repeatedly."""
     body = {
         "campaign": campaign,
         "unit": unit,

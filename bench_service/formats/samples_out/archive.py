@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from bench_service.formats.written_bytes import WrittenBytes
+from bench_service.formats.samples_out.written_bytes import WrittenBytes
 
 MANIFEST = "manifest.json"
 BEGIN_OF_ZIP = (1980, 1, 1, 0, 0, 0)

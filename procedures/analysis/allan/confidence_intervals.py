@@ -149,7 +149,9 @@ def _w(t: Array, alpha: int) -> Array:
 
 
 def interval(deviation: Array, edf: Array, confidence: float) -> tuple[Array, Array]:
-    """``σ·√(edf/χ²)`` at the two quantiles ``(1 ± confidence)/2`` of χ² with edf degrees of freedom (eq. 45)."""
+    """Return the ends of the interval, (k,) each: ``σ·√(edf/χ²)`` at the two quantiles ``(1 ± confidence)/2`` of χ²
+    with edf degrees of freedom (eq. 45). Raises `BadParameter` for a confidence outside 0 … 1.
+    """
     if not 0.0 < confidence < 1.0:
         raise BadParameter("confidence", confidence, "0 < confidence < 1")
     low, high = (2.0 * gammaincinv(edf / 2.0, (1.0 + side * confidence) / 2.0) for side in (1.0, -1.0))
