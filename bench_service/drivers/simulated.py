@@ -162,7 +162,7 @@ class SimulatedDriver:
         return bench
 
     def device_state(self) -> DeviceState | None:
-        """Read the devices' state from the register; None without one."""
+        """Return the devices' last noted state from the register; None without a register."""
         return None if self._register is None else RegisteredDevices(self._register).device_state()
 
     def compare(self, by: str) -> tuple[str, ...]:

@@ -45,7 +45,7 @@ def sample_type(name: str) -> SampleType:
 
 
 def rows_per_chunk(channels: int, dtype: SampleType) -> int:
-    """Number of samples of each channel that fill a chunk."""
+    """Return the number of samples of each channel that fill a chunk, about a megabyte."""
     return max(1, RAW_BYTES // (channels * dtype.itemsize))
 
 

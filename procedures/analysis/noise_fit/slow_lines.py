@@ -31,7 +31,7 @@ _EFFICIENCY = 0.35
 
 @dataclass(frozen=True)
 class WithoutLines:
-    """A record without its spectral lines."""
+    """Cell means of a record without its spectral lines, and the lines that were removed."""
 
     cells: Array
     """Cell means without the lines, (n,) [rate]."""
