@@ -191,8 +191,8 @@ class RegisteredDevices:
         """Stop the table, command the chamber to ambient, switch the unit off; return the state. The table of a dead
         process stops at once, at an unknown position.
 
-        A device whose link is lost stays as it is, and keeps no other from being made safe. Raises `BenchError`, or an
-        `ExceptionGroup` of the failures. The job whose demands are undone stays known in the register.
+        A device whose link is lost stays as it is, and keeps no other from being made safe. The job whose demands are
+        undone stays known until the next one.
         """
         state = self._register.read()
         if state is not None and state.safe:

@@ -58,7 +58,7 @@ class Planner:
         `NotMounted` for its unit.
 
         `mounting`: the id of the unit's mounting; None: the one that stands on that bench, if any. Raises
-        `BadParameter` for one that is not the unit's there.
+        `BadParameter` for one that does not stand there.
         """
         description = self.benches.description(self.benches.default() if bench is None else bench)
         context = Context(self.unit(unit, description.id), description)

@@ -1,4 +1,4 @@
-"""The sentence of a result whose recordings did not keep pace with the bench's clock."""
+"""Sentence of a result whose recordings did not keep pace with the bench's clock."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,9 @@ SCATTERS = 3.0
 
 
 def fell_behind(recordings: Sequence[RecordingInfo]) -> tuple[str, ...]:
-    """A sentence on recordings whose samples came at another rate than the declared one; none where all kept it."""
+    """Return a sentence on recordings whose samples came at another rate than the declared one; nothing where all kept
+    it.
+    """
     late = [(info, pace) for info in recordings if (pace := _pace(info)) is not None and _is_late(info, pace)]
     if not late:
         return ()

@@ -9,7 +9,7 @@ from procedures.core.recording import Station
 
 @dataclass(frozen=True)
 class BenchNeeds:
-    """What a job needs of its bench: a sample rate, and the optional sensors and sources that it uses."""
+    """Needs of a job on its bench: a sample rate, and the optional sensors and sources that it uses."""
 
     sample_rate_hz: float | None = None
     """Sample rate of the unit; None: its own rate."""

@@ -127,8 +127,10 @@ def jobs(
     unit: Annotated[str | None, typer.Option(help="Only jobs of this unit")] = None,
     bench: Annotated[str | None, typer.Option(help="Only jobs of this bench")] = None,
     verdict: Annotated[str | None, typer.Option(help="pass, fail or error")] = None,
-    since: Annotated[str | None, typer.Option(help="Created at this time or later: 2026-11-30T08:00:00Z")] = None,
-    until: Annotated[str | None, typer.Option(help="Created before this time")] = None,
+    since: Annotated[
+        str | None, typer.Option(help="Created at this time, date or later, or so long ago: 2026-11-30, 7d")
+    ] = None,
+    until: Annotated[str | None, typer.Option(help="Created before; as --since")] = None,
     label: Annotated[list[str], typer.Option(help="name or name=text; may be repeated")] = NO_ITEMS,
     text: Annotated[str | None, typer.Option(help="In an id, a name or a label")] = None,
     limit: Limit = 20,

@@ -15,7 +15,8 @@ def run_table(run: dict[str, Any]) -> Table:
     )
     for step in run["steps"]:
         bad = [c["name"] for c in step["checks"] if not c["passed"]]
-        missed = f"missed: {', '.join(bad)}" if bad else ""
+        failed = [c["name"] for c in step["checks"] if not c["passed"] and not c.get("bound", False)]
+        missed = f"missed: {', '.join(failed)}" if failed else ""
         told = "\n".join(filter(None, [step["reason"], missed, *step["warnings"]]))
         passed = f"{len(step['checks']) - len(bad)}/{len(step['checks'])}"
         table.add_row(step["name"], step["does"], step["state"], _verdict(step["verdict"]), passed, told)

@@ -42,21 +42,28 @@ def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]]
 
 
 def check_table(document: dict[str, Any]) -> Table:
-    """Return the table of a result's checks, each value next to its limit."""
+    """Return the table of a result's checks, each value next to its limit with its source; the notes stand below."""
     table = Table(title="Checks")
-    for column in ("check", "value", "U", "limit", "unit", "outcome"):
-        table.add_column(column, justify="left" if column in ("check", "unit", "outcome") else "right")
+    words = ("check", "unit", "source of the limit", "outcome")
+    for column in ("check", "value", "U", "limit", "unit", "source of the limit", "outcome"):
+        table.add_column(column, justify="left" if column in words else "right")
     for check in document.get("checks", []):
         limit = check["limit"]
         bounds = [f"≥ {limit['minimum']:.4g}"] if limit["minimum"] is not None else []
         bounds += [f"≤ {limit['maximum']:.4g}"] if limit["maximum"] is not None else []
         made = check.get("decision") or {}
         said = made.get("outcome") or ("pass" if check["passed"] else "fail")
-        outcome = Text(said, style="green" if check["passed"] else "red")
+        undecided = check.get("bound", False) and not check["passed"]
+        outcome = Text(said, style="green" if check["passed"] else "yellow" if undecided else "red")
         expanded = "" if made.get("expanded_uncertainty") is None else f"{made['expanded_uncertainty']:.2g}"
-        table.add_row(check["name"], f"{check['value']:.4g}", expanded, ", ".join(bounds), limit["unit"], outcome)
+        source = Text(limit.get("source", ""))
+        value = f"{'< ' if check.get('bound') else ''}{check['value']:.4g}"
+        table.add_row(check["name"], value, expanded, ", ".join(bounds), limit["unit"], source, outcome)
+    said: list[str] = []
     if (statement := document.get("statement")) is not None:
-        table.caption = f"{statement['outcome']}; decision rule: {statement['rule']}; U: expanded uncertainty"
+        said = [f"{statement['outcome']}; decision rule: {statement['rule']}; U: expanded uncertainty"]
+    notes = [f"{check['name']}: {check['note']}" for check in document.get("checks", []) if check.get("note")]
+    table.caption = Text("\n".join([*said, *notes]))
     return table
 
 
@@ -110,7 +117,8 @@ def correction_table(corrections: list[dict[str, Any]]) -> Table:
     for column in ("correction", "kind", "made", "result", "verdict", "current", "approval", "valid until"):
         table.add_column(column, overflow="fold")
     for one in corrections:
-        current = ("current, not usable" if one["unusable"] else "current") if one["current"] else ""
+        chosen = ("by rule" if one["by_rule"] else "chosen") if one["current"] else ""
+        current = f"{chosen}, not usable" if chosen and one["unusable"] else chosen
         until = one["valid_until"] or "–"
         cells = (one["made_at"][:19], one["result"], one["verdict"], current, one["approval"], until[:19])
         table.add_row(one["id"], one["kind"], *cells)
@@ -152,9 +160,18 @@ def recording_table(recordings: list[dict[str, Any]]) -> Table:
     return table
 
 
+def recording_line(recording: dict[str, Any]) -> str:
+    """A recording in one line: its id first."""
+    return (
+        f"recording {recording['id']} of unit {recording['unit']}: {recording['count']} samples of "
+        f"{len(recording['channels'])} channels, {recording['rate_hz']:.9g} Hz, {recording['duration_s']:.9g} s"
+    )
+
+
 def result_table(results: list[dict[str, Any]]) -> Table:
     """Return the table of results, in the order given."""
     table = _table("result", "procedure or method", "unit", "verdict", "job", "made")
+    table.columns[4].no_wrap = True
     for one in results:
         job = one["lineage"]["job"] or "–"
         table.add_row(

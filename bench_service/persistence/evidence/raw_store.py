@@ -1,8 +1,8 @@
 """The places of raw data in SQL: which recordings are old enough, what needs them, and the moves of their chunks.
 
 A move begins with one transaction that decides (`removing`, `archiving`, `restoring`), goes over the chunks a few at a
-time, so that it keeps no writer waiting, and ends with one that says it is done. A crash in between leaves the first:
-`unfinished` names it, and the move is done again.
+time, so that it keeps no writer waiting, and ends with one that says so. A crash in between leaves the first word, by
+which every reader acts rightly, and the next run continues from there.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -83,7 +83,7 @@ class ChannelResponse(Part):
 
 
 class DynamicResponse(Part):
-    """Results of all channels."""
+    """Results of a dynamic response for all channels, with the scatter of the stamps and warnings."""
 
     channels: tuple[ChannelResponse, ...]
     """Channels, in order"""

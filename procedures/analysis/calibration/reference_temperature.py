@@ -245,7 +245,7 @@ def gyros_at_reference(
 
 
 def thermal_share(at: AtReference, fit: TriadFit) -> ThermalShare:
-    """Effect of the thermal correction on the accelerometers' calibration, through the estimator of the fit."""
+    """Return the effect of the thermal correction on the calibration, through the estimator of the fit."""
 
     def share(covariance: Array) -> dict[str, float]:
         gain = fit.estimator.gain
@@ -265,7 +265,7 @@ def thermal_share(at: AtReference, fit: TriadFit) -> ThermalShare:
 
 
 def thermal_warnings(at: AtReference) -> tuple[str, ...]:
-    """Warnings about the use of the correction at these temperatures."""
+    """Return warnings about the use of the correction at these temperatures."""
     correction = at.correction
     warnings = _of_range(at.temperatures, correction)
     unknown = [name for name, axis in zip("xyz", correction.axes, strict=True) if not axis.covariance]

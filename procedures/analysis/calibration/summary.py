@@ -62,7 +62,7 @@ class ScalarCheck:
 
 @dataclass(frozen=True)
 class TriadSummary:
-    """Complete calibration results of one triad."""
+    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets. JSON-ready."""
 
     calibration: TriadCalibration
     coefficients: tuple[Coefficient, ...]
@@ -82,11 +82,8 @@ class TriadSummary:
     """Station and channel with the greatest residual."""
     left_out: Magnitudes | None = None
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
-    suspect: str = ""
-    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared.
-
-    `triad_analysis.suspected` finds it from all triads of the same stations.
-    """
+    suspect: str = ""  # by `triad_analysis.suspected`, from all triads of the same stations
+    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
     budgets: tuple[Budget, ...] = ()
     """Uncertainty budget of each coefficient; empty in results of older versions."""
 
@@ -104,7 +101,9 @@ def triad_summary(
     slow: float = 0.0,
     left_out: Magnitudes | None = None,
 ) -> TriadSummary:
-    """Numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not known."""
+    """Return the numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not
+    known.
+    """
     misfit = residual_misfit(fit.residuals, fit.residual_sd, fit.chi_square, fit.degrees_of_freedom, labels, slow)
     return TriadSummary(
         fit.calibration(),

@@ -1,4 +1,4 @@
-"""Limits on a calibration held against its plan: those that it cannot resolve, and the check of the bias in run."""
+"""Limits on a calibration compared with its plan: those that it cannot resolve, and the check of the bias in run."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import chdtrc, chdtri
 
 from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
-from procedures.analysis.calibration.plan import TriadPlan
+from procedures.analysis.calibration.plan import TriadPlan, in_sample_covariance
 from procedures.analysis.calibration.reference import INPUT_UNITS
 from procedures.analysis.calibration.station_plan import dwell_for
 from procedures.analysis.calibration.verification import effective_freedom, predicted_sd
@@ -47,7 +47,9 @@ def run_to_run_requirements(
     accelerometer_bias_m_s2: float,
     accelerometer_scale_ppm: float,
 ) -> tuple[Requirement, ...]:
-    """The limits on stability from launch to launch (thesis 4.3, 5.6); without that of the gyro scale where None."""
+    """Return the limits on stability from launch to launch (thesis 4.3, 5.6); without that of the gyro scale where
+    None.
+    """
     deg_h, ppm = units.DEG_PER_HOUR, units.PPM
     scale = () if gyro_scale_ppm is None else (gyro_scale_ppm * ppm,)
     return (
@@ -92,13 +94,18 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     )
 
 
-def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size: float) -> str | None:
-    """Warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI]."""
-    planned = plan.at_dwell()
-    if planned is None:
+def in_run_unresolved(
+    plan: TriadPlan, limit: float, display: str, display_size: float, *, in_sample: bool = False
+) -> str | None:
+    """Return a warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit
+    [SI]; else None.
+
+    `in_sample`: of a calibration at its own stations, which follows a part of the noise.
+    """
+    covariance = in_sample_covariance(plan) if in_sample else _of_dwells(plan)
+    if covariance is None:
         return None
-    gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
-    expected = predicted_sd(magnitude_covariance(gradient, planned.noise_covariance)) / float(np.sqrt(3.0))
+    expected = predicted_sd(covariance) / float(np.sqrt(3.0))
     if expected <= limit:
         return None
     return (
@@ -107,23 +114,26 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
     )
 
 
+def _of_dwells(plan: TriadPlan) -> Array | None:
+    """Covariance (n, n) of magnitudes by the noise of the dwells alone; None where it is not known."""
+    noise = plan.noise_covariance()
+    gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
+    return None if noise is None else magnitude_covariance(gradient, noise)
+
+
 def in_run_check(
-    plan: TriadPlan, maximum: float | None, covariance: Array | None = None, level: float = IN_RUN_LEVEL
+    plan: TriadPlan, maximum: float | None, covariance: Array | None, level: float = IN_RUN_LEVEL
 ) -> PlannedCheck:
     """Planned check of the error per axis δ/√3 of n stations, its limit in the triad's unit of display.
 
-    δ² is a mean square of the degrees of freedom of `effective_freedom`; its part of the measurement is what the noise
-    of the dwells leaves, or errors of magnitude with the `covariance` (n, n) given. Without a maximum the limit is the
-    plan's expanded uncertainty: what a sound unit exceeds with the probability `level`, ``k² = χ²_ν(1 − level)/ν``.
+    δ² is a mean square of the degrees of freedom of `effective_freedom`; its part of the measurement has errors of
+    magnitude with the `covariance` (n, n), None where the noise is not known. Without a maximum the limit is the plan's
+    expanded uncertainty: what a sound unit exceeds with the probability `level`, ``k² = χ²_ν(1 − level)/ν``.
     (k = 2 would not do: where six coefficients that change between launches move all stations, ν is near 2 and one
     sound unit in fifty exceeds it.) Raises `BadParameter` where the uncertainty is not known.
     """
     display, size = units.DISPLAY[INPUT_UNITS[plan.triad]]
     name = f"{plan.triad} bias in run, δ/√3"
-    planned = plan.at_dwell()
-    if covariance is None and planned is not None:
-        gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
-        covariance = magnitude_covariance(gradient, planned.noise_covariance)
     floor = None if covariance is None else predicted_sd(covariance) / float(np.sqrt(3.0)) / size
     freedom = None if covariance is None else effective_freedom(covariance)
     own = None

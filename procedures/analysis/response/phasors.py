@@ -103,7 +103,7 @@ def response(samples: Samples, frequency_hz: float, noise: NoiseCoefficients | N
 
 
 def require_known(label: str, relative_sd: float) -> None:
-    """Refuse a response that is hardly known. Raises `UnfitRecording`."""
+    """Refuse a response whose relative standard uncertainty is too large. Raises `UnfitRecording`."""
     if not relative_sd < NOISIEST:
         raise UnfitRecording(
             f"station {label}: the response is known to {min(100.0 * relative_sd, 999.0):.3g} % alone, more than "
@@ -113,7 +113,7 @@ def require_known(label: str, relative_sd: float) -> None:
 
 @dataclass(frozen=True)
 class Fitted:
-    """Complex amplitude of a sinusoid beside a constant and a drift."""
+    """Complex amplitude of a sinusoid, fitted with a constant and a drift; its residuals and weights."""
 
     value: complex
     left: Array

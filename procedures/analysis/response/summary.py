@@ -85,7 +85,7 @@ class ChannelResponse:
 
 @dataclass(frozen=True)
 class DynamicResponse:
-    """Results of all channels."""
+    """Results of a dynamic response for all channels, with the scatter of the stamps and warnings."""
 
     channels: tuple[ChannelResponse, ...]
     stamp_scatter_s: float
@@ -141,7 +141,9 @@ def _swung(recording: Recording) -> tuple[str, list[float], float]:
 
 
 def table_axes_b(angles: TableAngles) -> Array:
-    """Directions of outer, middle and inner axis in the unit's axes, (3, 3); see `core.frames.table_rotation`."""
+    """Return the directions of outer, middle and inner axis in the unit's axes, (3, 3); see
+    `core.frames.table_rotation`.
+    """
     within_middle = table_rotation(TableAngles(0.0, 0.0, angles.inner_deg)).inv()
     outer = table_rotation(angles).inv().apply(np.array([0.0, 1.0, 0.0]))
     return np.array([outer, within_middle.apply(np.array([0.0, 0.0, 1.0])), [1.0, 0.0, 0.0]])

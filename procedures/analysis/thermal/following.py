@@ -62,7 +62,9 @@ def _exact(x: Array, tau: float, sample_s: float, start: float) -> Array:
 
 
 def modelled(case_c: Array, sample_s: float, delay_s: float, case_lag_s: float, sensor_lag_s: float) -> Array:
-    """Readings of the converter's sensor, (n,), by readings of the case's (n,), without heating and first state."""
+    """Return the readings of the converter's sensor, (n,), by readings of the case's (n,), without heating and first
+    state.
+    """
     board = _exact(case_c, delay_s, sample_s, float(case_c[0]))
     board = board + case_lag_s * (case_c - board) / delay_s
     return _exact(board, sensor_lag_s, sample_s, float(board[0]))

@@ -55,7 +55,7 @@ class ThermalRun:
     """Specific force along the true input axis of each accelerometer: gravity and zero for an ideal mounting."""
 
     def case(self, axis: int) -> Array:
-        """Static regressor of an axis, (n,)."""
+        """Return the static regressor of an axis, (n,) [°C]."""
         return self.case_c if self.case_c.ndim == 1 else self.case_c[:, axis]
 
 

@@ -63,7 +63,9 @@ def cycle_checks(cycle: ThermalCycle, limits: CycleLimits, *, correct_gyros: boo
 
 
 def planned_cycle_checks(limits: CycleLimits) -> tuple[PlannedCheck, ...]:
-    """Checks that a cycle will have. Its uncertainties rest on the temperatures to come and are not predicted."""
+    """Return the checks that a cycle will have. Its uncertainties rest on the temperatures to come and are not
+    predicted.
+    """
     force = Limit("m/s^2", maximum=limits.three_sigma_m_s2, source=THESIS)
     rms = Limit("m/s^2", maximum=limits.magnitude_rms_m_s2, source=THESIS)
     level = limits.level / len(AXES)
@@ -84,4 +86,4 @@ def _noise(name: str, noises: list[GyroNoise], process: int, maximum: float) -> 
     if seen:
         return check(name, float(np.mean(seen)) / size, limit, note=f"seen in {len(seen)} of {len(values)} runs")
     bound = min(g.upper_limits[process] for g in noises)
-    return check(name, bound / size, limit, note="not observed: the value is what it stays below")
+    return check(name, bound / size, limit, note="not observed: the value is what it stays below", bound=True)
