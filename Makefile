@@ -3,9 +3,9 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 WORKERS ?= 2
-VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access absence document acceptance wires_campaign
+VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access absence document pdf_a certificates acceptance wires_campaign wires_thermal wires_response
 FOREIGN := basil edie instro ixcom moto visa
-LONG_BENCHMARKS := $(addprefix tests.benchmarks.,growth lists analysis_workers)
+LONG_BENCHMARKS := $(addprefix tests.benchmarks.,growth lists analysis_workers large_bags)
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
@@ -59,14 +59,14 @@ format: $(VENV)/.ready  ## format the code, put imports in order, mend what ruff
 check: $(VENV)/.ready  ## format, lint, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/lint-imports --no-cache && $(BIN)/basedpyright
 
-validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated units and more
+validate: $(VENV)/.ready .foreign/verapdf/.ready  ## Monte Carlo against theory over 1000 simulated units and more
 	@held=0; for part in $(VALIDATIONS); do echo "== $$part"; $(BIN)/python -m tests.validation.$$part || held=1; done; \
 	ALL_FORMS=1 $(BIN)/python -m pytest -q -n 2 tests/storage/test_upgrades.py || held=1; exit $$held
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
-bench-long: $(VENV)/.ready  ## growth of cost with size, lists over 10^5 jobs and 10^6 recordings, workers of analyses; an hour
+bench-long: $(VENV)/.ready  ## growth of cost with size, lists over 10^5 jobs and 10^6 recordings, workers of analyses, bags of 2 GB; an hour
 	@kept=0; for part in $(LONG_BENCHMARKS); do echo "== $$part"; $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
 bench-against: $(VENV)/.ready  ## this checkout beside revision REV (e36ea0a), built beside it, in turns; ONLY=static,allan ROUNDS=5

@@ -11,38 +11,9 @@ from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import (
-    audit,
-    audit_chain,
-    batches,
-    certificates,
-    database,
-    health,
-    metrics,
-    mountings,
-    procedures,
-    recordings,
-    reservations,
-    results,
-    samples,
-    storage,
-    synthetic,
-    trends,
-)
+from bench_service.api import audit, health, metrics
 from bench_service.api.access import guard, identify
-from bench_service.api.access import routes as access
-from bench_service.api.benches import routes as benches
-from bench_service.api.campaigns import routes as campaigns
-from bench_service.api.campaigns import schedules
-from bench_service.api.feed import news
-from bench_service.api.feed import routes as feed
-from bench_service.api.http import bodies, door, endings, errors, headers, queries, request_id, transfer
-from bench_service.api.jobs import estimates, event_stream
-from bench_service.api.jobs import routes as jobs
-from bench_service.api.manual import routes as manual
-from bench_service.api.openapi import document
-from bench_service.api.units import calibrations, notes
-from bench_service.api.units import routes as units
+from bench_service.api.http import bodies, door, endings, errors, headers, late_routes, queries, request_id, transfer
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import LiveBoard
@@ -51,27 +22,15 @@ from bench_service.bench.safety import SafetyService
 from bench_service.bench.stop.elsewhere import StopAddresses
 from bench_service.bench.stop.road import StopRoads
 from bench_service.bench_files import BenchFiles
+from bench_service.collector import no_collection
 from bench_service.drivers.composition import devices_of, driver_of, own_devices
 from bench_service.drivers.simulated import drawn_unit, synthetic_rates
 from bench_service.driving import driving
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.reports.printing_process import open_printing
 from bench_service.evidence.work_processes import WorkApart, WorkProcesses
-from bench_service.jobs.events.hub import EventHub
 from bench_service.jobs.planning import Planner
-from bench_service.pages import (
-    access_pages,
-    bench_pages,
-    campaign_pages,
-    console_pages,
-    docs,
-    figures,
-    images,
-    languages,
-    static_files,
-    stop_pages,
-)
-from bench_service.pages import routes as pages
+from bench_service.pages import figures
 from bench_service.pages.drawing_process import open_drawing
 from bench_service.pages.errors import ErrorPages
 from bench_service.persistence import Database, lease_holder, open_stores
@@ -90,47 +49,6 @@ IMPORT_THREADS = 4
 """Maximum number of imports that are stored or wait for a reader at one time; more wait without a thread."""
 DRAWINGS = 30
 """Maximum number of figures that are drawn or wait at one time."""
-ROUTERS = (
-    procedures,
-    jobs,
-    recordings,
-    synthetic,
-    samples,
-    batches,
-    results,
-    units,
-    calibrations,
-    trends,
-    benches,
-    reservations,
-    mountings,
-    manual,
-    campaigns,
-    schedules,
-    access,
-    audit,
-    database,
-    storage,
-    audit_chain,
-    health,
-    metrics,
-    feed,
-    certificates,
-    estimates,
-    notes,
-)
-PAGES = (
-    static_files,
-    languages,
-    docs,
-    access_pages,
-    images,
-    stop_pages,
-    bench_pages,
-    console_pages,
-    pages,
-    campaign_pages,
-)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:
@@ -221,15 +139,18 @@ def create_app(
     at_end: Callable[[], None],
     rules: door.Door,
     proxies: identify.Proxies,
+    late: late_routes.LateRoutes,
 ) -> FastAPI:
-    """The application around a service that is open; `at_end` is called when the server shuts down.
+    """Return the FastAPI application around a service that is open; `at_end` is called when the server shuts down.
 
-    `rules`: decide which requests are let in; `proxies`: those that authenticate people.
+    `rules`: decide which requests are let in; `proxies`: those that authenticate people; `late`: begun when the server
+    answers, it loads all routes but those of health.
     """
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncGenerator[None]:
-        service.begin([figures.warm_up], answers=True)
+        late.begin(partial(_add_nouns, app, service))
+        service.begin(answers=True)
         try:
             yield
         finally:
@@ -247,14 +168,10 @@ def create_app(
         redoc_url=None,
     )
     app.state.service = service
-    app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
-    app.state.news = news.NewsReader(service)
     app.state.max_import_bytes = max_import_bytes
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
-    for module in ROUTERS:
-        app.include_router(module.router)
-    for page in PAGES:
-        app.include_router(page.router)
+    health.router.add_to(app.router)
+    app.add_middleware(late_routes.WaitForRoutes, late=late)
     app.add_middleware(guard.Guarded, access=service.access)
     transfer.install(app)
     app.add_middleware(bodies.Bounded)
@@ -268,5 +185,12 @@ def create_app(
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)
-    document.install(app, lambda: service.catalogue)
     return app
+
+
+def _add_nouns(app: FastAPI, service: BenchService) -> None:
+    """Add all other routes; they are imported here because that takes as long as all of the start before."""
+    with no_collection():
+        from bench_service.nouns import add_nouns
+
+        add_nouns(app, service)

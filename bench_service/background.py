@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 def in_background(name: str, work: Callable[[], T]) -> "Future[T]":
-    """Start `work` in a daemon thread; the future has its result or its error.
+    """Start `work` in a daemon thread, and return a future with its result or its error.
 
     Log lines of the thread carry the caller's context.
     """
@@ -30,8 +30,9 @@ def in_background(name: str, work: Callable[[], T]) -> "Future[T]":
 
 
 class WorkInOrder:
-    """Work that may hang, one piece after the other in one background thread; so much may wait and no more. For any
-    thread."""
+    """Queue of work that may hang, done piece by piece in one background thread; its length is limited. For any
+    thread.
+    """
 
     def __init__(self, name: str, most: int) -> None:
         """Set up with `most`: the number of pieces that may wait."""
@@ -41,7 +42,7 @@ class WorkInOrder:
         self._thread: Thread | None = None
 
     def add(self, work: Callable[[], None]) -> "Future[None] | None":
-        """Have a piece done after those that wait; the future has its error. None: too many wait already."""
+        """Queue a piece of work, and return a future that has its error; None where the queue is full."""
         with self._starting:
             if self._thread is None:
                 self._thread = Thread(target=self._run, name=self._name, daemon=True)

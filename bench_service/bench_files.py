@@ -22,7 +22,7 @@ from bench_service.settings import Settings
 
 
 class BenchFiles:
-    """The files of the settings' bench on this host."""
+    """Device files of the settings' bench on this host: stop channel, heartbeat, identity of the driving process."""
 
     def __init__(self, settings: Settings) -> None:
         folder, self._bench_id = settings.devices_in(), settings.bench_id
@@ -37,7 +37,7 @@ class BenchFiles:
         return before_anything_else(self._devices, f"the service, {ProcessIdentity.own()}")
 
     def begin_driving(self) -> None:
-        """Register this process as the bench's driver; its lease must be held. Raises `StorageFull`."""
+        """Write this process into the files as the bench's driver; its lease must be held. Raises `StorageFull`."""
         try:
             self._channel.prepare()
             self._heartbeat.prepare()
@@ -52,17 +52,23 @@ class BenchFiles:
         return bool(self._channel.standing())
 
     def guard(self, make_safe: Callable[[], object], wake: Callable[[], object]) -> StopGuard:
-        """The guard of this process; see `StopGuard`."""
+        """Return the stop guard of this process, which has the bench made safe and the worker woken."""
         return StopGuard(self._channel, self._heartbeat, self._is_safe, make_safe, wake)
 
     def keep_books(self, stores: Stores) -> StopKeeper:
-        """Begin to enter stops of the channel into the database, and to remove released ones."""
+        """Start the thread that enters stops of the channel into the database and removes released ones, and
+        return it.
+        """
         keeper = StopKeeper(self._channel, _Books(stores, self._bench_id))
         keeper.begin()
         return keeper
 
     def _is_safe(self) -> bool:
-        state = self._devices.device_state()
+        """Return whether the devices report that they are safe; not where their register cannot be read."""
+        try:
+            state = self._devices.device_state()
+        except OSError:  # no descriptor left, for one
+            return False
         return state is not None and state.safe
 
 

@@ -26,7 +26,7 @@ def no_collection() -> Generator[None]:
 
 
 def pause() -> None:
-    """Keep the collector away until `resume` was called as often."""
+    """Switch the cyclic collector off until `resume` was called as often. For any thread."""
     global _paused
     with _mutex:
         _paused += 1
@@ -34,7 +34,9 @@ def pause() -> None:
 
 
 def resume() -> None:
-    """Let the collector work again, but for what is there now, once no other block keeps it away."""
+    """Switch the cyclic collector on again, once no other block keeps it off; objects that exist now are left out of
+    it.
+    """
     global _paused
     with _mutex:
         _paused -= 1

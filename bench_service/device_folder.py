@@ -12,7 +12,9 @@ BENCH_ID = "sim"
 
 
 def bench_id_in(bench_file: Path) -> str | None:
-    """Id of the bench that a bench file describes; None where it cannot be read: its full reading says why."""
+    """Return the id of the bench that a bench file describes; None where the file cannot be read: its full reading says
+    why.
+    """
     try:
         found = tomllib.loads(bench_file.read_text(encoding="utf-8"))["bench"]["id"]
     except (OSError, ValueError, KeyError, TypeError):
@@ -21,7 +23,9 @@ def bench_id_in(bench_file: Path) -> str | None:
 
 
 def device_folder(database_url: str, given: Path | None) -> Path:
-    """The given folder, or the folder of an SQLite file, or one in .bench/ named by a Postgres database."""
+    """Return the folder of device files: the given one, or that of an SQLite file, or one in .bench/ named by a
+    Postgres database.
+    """
     if given is not None:
         return given
     address = urlsplit(database_url)

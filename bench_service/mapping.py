@@ -38,7 +38,7 @@ def copied(shape: type[T], *sources: object, **given: Any) -> T:
 
 
 def field_names(shape: type) -> tuple[str, ...]:
-    """Names of a shape's fields, in their order: of a dataclass, a pydantic model or a mapped table."""
+    """Return the names of a shape's fields in their order: of a dataclass, a pydantic model or a mapped table."""
     return tuple(_fields(shape))
 
 

@@ -1,7 +1,7 @@
 """One service of a process: the services of each noun, and its life from registration to its end."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from bench_service.access.book import AccessBook
@@ -46,7 +46,9 @@ LEAST_FREE_BYTES = 200_000_000
 
 
 class BenchService:
-    """Everything that HTTP, pages and command line can request, by noun."""
+    """All services of one process by noun (jobs, campaigns, evidence, access, …), for HTTP, pages and command line, and
+    their life.
+    """
 
     def __init__(
         self,
@@ -117,7 +119,9 @@ class BenchService:
         self._nightly = NightlyScrub(self.upkeep, rules.scrub_at, nightly.run)
 
     def register(self) -> None:
-        """Register the bench and its units, and discard orphaned imports."""
+        """Store the description of the own bench and its units, and remove orphaned imports. Raises
+        `StorageFailure`.
+        """
         self.imports.discard_crashed()
         if self._driver is None:
             return
@@ -131,18 +135,18 @@ class BenchService:
                 log.warning("bench %s: %s", self._driver.description.id, self._missing)
             self.safety.at_start(self._driver.description.id, self._rescued)
 
-    def begin(self, warm_up: Sequence[Callable[[], object]] = (), answers: bool = False) -> None:
+    def begin(self, answers: bool = False) -> None:
         """Begin to work while the service already answers. The bench's lease must be held.
 
         `answers`: this process answers clients, which keeps leases of manual mode alive.
-        `warm_up` is called while no job runs, once the engine runs and the numerics are loaded.
         """
         if answers:
             self._presence.begin()
         if self._runner is not None and self._runner.resumes:
             self._runner.begin()
         if self._worker is not None:
-            self._worker.begin([lambda: self.catalogue.procedures, lambda: self.catalogue.methods, *warm_up])
+            warm_up = [lambda: self.catalogue.procedures, lambda: self.catalogue.methods]
+            self._worker.begin(warm_up if self._driver is None else [self._driver.warm_up, *warm_up])
             self.campaigns.conductor.begin()
             self._nightly.begin()
 
@@ -156,15 +160,15 @@ class BenchService:
         return None if self._worker is None else self._worker.failed_start()
 
     def require_start(self) -> None:
-        """Wait until the engine runs. Raises `NotDriving` where it does not start."""
+        """Wait until the job engine runs. Raises `NotDriving` where it does not start."""
         if self._worker is not None:
             self._worker.require_engine()
 
     def ready(self) -> tuple[str, ...]:
-        """Return once a job could start, with notes for a person.
+        """Wait until a job could start, and return notes for a person.
 
-        A stopped bench is such a note: a person has stopped it, and the service works. Raises `NotReady` with
-        every reason, `StorageFailure` where the database does not answer.
+        A stopped bench is such a note: a person has stopped it, and the service works. Raises `NotReady` with every
+        reason, `StorageFailure` where the database does not answer.
         """
         self.stores.jobs.has_any()
         reasons = list(self.upkeep.troubles())
@@ -182,7 +186,7 @@ class BenchService:
         return (*stopped, *missing, *self.catalogue.notes(), *self.upkeep.notes())
 
     def stop(self) -> None:
-        """End the service: the running job is left for the next start, and the bench made safe."""
+        """End the service, and wait until the bench is safe; the running job resumes after the next start."""
         self._nightly.end()
         self._presence.end()
         self.campaigns.conductor.stop()

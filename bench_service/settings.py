@@ -32,7 +32,9 @@ Network = Annotated[str, AfterValidator(_network)]
 
 
 class Settings(BaseModel):
-    """Settings of data and server. Environment: `BENCH_` + the field's name in capitals, once."""
+    """All settings of the service, checked and frozen. Each is read from the variable `BENCH_` + its name in capitals,
+    once, in `__main__`.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -132,17 +134,17 @@ class Settings(BaseModel):
         return self
 
     def stop_secret_in(self) -> Path:
-        """The file of the secret under which a stop goes to another host."""
+        """Return the file of the secret under which a stop goes to another host."""
         return self.stop_secret_file or self.devices_in() / "bench-stop.secret"
 
     def copies_in(self) -> Path | None:
-        """The folder of copies made before a migration; None: next to the SQLite file."""
+        """Return the folder of copies made before a migration; None: next to the SQLite file."""
         if self.backup_folder is not None or self.database_url.startswith("sqlite"):
             return self.backup_folder
         return self.devices_in()
 
     def token(self) -> str | None:
-        """The token of `token_file`; None where the settings name none. Raises `BadSettings`."""
+        """Return the token in the file `token_file`; None where the settings name none. Raises `BadSettings`."""
         if self.token_file is None:
             return None
         try:
@@ -157,12 +159,14 @@ class Settings(BaseModel):
         return words[0]
 
     def devices_in(self) -> Path:
-        """The folder of the devices' registers."""
+        """Return the folder of the bench's device files (registers, stop channel, heartbeat)."""
         return device_folder(self.database_url, self.device_folder)
 
     @classmethod
     def from_environ(cls, environ: Mapping[str, str]) -> "Settings":
-        """Read settings from a mapping such as ``os.environ``. Raises `BadSettings`."""
+        """Return the settings from a mapping such as ``os.environ``. Raises `BadSettings`, also for an unknown `BENCH_`
+        variable.
+        """
         unknown = sorted(key for key in environ if key.startswith("BENCH_") and key not in cls.variables())
         if unknown:
             raise BadSettings(f"{unknown[0]} is not a setting; the settings are {', '.join(cls.variables())}")
@@ -181,7 +185,7 @@ class Settings(BaseModel):
 
     @classmethod
     def variables(cls) -> tuple[str, ...]:
-        """Names of all environment variables that are read."""
+        """Return the names of all environment variables that are read."""
         return tuple(_variable(name) for name in cls.model_fields)
 
 

@@ -7,32 +7,34 @@ import uuid_utils
 
 
 def now() -> datetime:
-    """The present moment, with its time zone (UTC)."""
+    """Return the present moment of the real clock, in UTC."""
     return datetime.now(UTC)
 
 
 def monotonic_s() -> float:
-    """Seconds of a clock that is never set back."""
+    """Return the seconds of a clock that is never set back."""
     return time.monotonic()  # noqa: TID251  the one place
 
 
 def monotonic_at_s(moment: datetime) -> float:
-    """Reading of `monotonic_s` at a moment, counted from now: a clock that is set back later does not move it."""
+    """Return the reading that `monotonic_s` has at a moment, counted from now: a clock that is set back later does not
+    move it.
+    """
     return monotonic_s() + (moment - now()).total_seconds()
 
 
 def pause(seconds: float) -> None:
-    """Wait in real time, in this thread."""
+    """Wait in real time [s], and hold this thread."""
     time.sleep(seconds)  # noqa: TID251  the one place
 
 
 def new_id() -> str:
-    """An id that sorts by the time of its making (UUID version 7)."""
+    """Return a new id that sorts by the time of its making (UUID version 7)."""
     return str(uuid_utils.uuid7())
 
 
 async def pause_async(seconds: float) -> None:
-    """Wait in real time without holding the thread."""
+    """Wait in real time [s] without holding the thread."""
     import asyncio  # here: `bench stop` begins without it
 
     await asyncio.sleep(seconds)  # noqa: TID251  the one place

@@ -26,7 +26,7 @@ Schemas = dict[str, dict[str, Any]]
 
 
 def modules(document: dict[str, Any]) -> dict[str, str]:
-    """Return the text of each generated module by its file name."""
+    """Return the text of each generated module by its file name, from an OpenAPI document."""
     schemas: Schemas = document["components"]["schemas"]
     names: dict[str, str] = schemas["ResultView"]["discriminator"]["mapping"]
     roots = {name: reference.removeprefix(PREFIX) for name, reference in names.items()}

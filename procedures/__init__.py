@@ -1,4 +1,4 @@
-"""The domain of testing inertial units. No HTTP, SQL, MuJoCo, files, wall clock or dice.
+"""The domain of testing inertial units. No HTTP, SQL, MuJoCo, files, real clock or random generator.
 
 Conventions
 -----------

@@ -77,7 +77,7 @@ class _SetPoint:
     """Set point that moves along the commanded ramp, for a chamber that reports only the final one."""
 
     def __init__(self, first: ChamberReading) -> None:
-        """Begin at the first reading, where the chamber was led to the first leg's temperature already."""
+        """Begin at the first reading, where the chamber was commanded to the first leg's temperature already."""
         told = first.set_point_c if first.set_point_c is not None else first.target_c
         self._value_c, self._time_s = first.air_c if told is None else told, first.time_s
 

@@ -17,7 +17,7 @@ class Discovered(Generic[E]):
     broken: dict[str, Exception] = field(default_factory=dict[str, Exception])
 
     def complete(self) -> dict[str, E]:
-        """All entries of the folder. Raises the error of the first file that is broken."""
+        """Return all entries of the folder by name. Raises the error of the first file that is broken."""
         for error in self.broken.values():
             raise error
         return self.entries

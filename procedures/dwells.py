@@ -43,7 +43,8 @@ class StopAt(Parameters):
         return self
 
     def resolved(self, unit: Unit, least_s: float = 0.0) -> "StopAt":
-        """The target with its rule, by the noise of the unit's record. Raises `BadParameter` where that is unknown.
+        """Return the target with its rule, by the noise of the unit's record. Raises `BadParameter` where that is
+        unknown.
 
         `least_s`: no dwell ends before it, also under a rule that was given.
         """
@@ -69,7 +70,7 @@ class StopAt(Parameters):
         return self.model_copy(update={"rule": rule})
 
     def warnings(self, longest_s: float) -> tuple[str, ...]:
-        """Targets that the longest dwell does not reach by the unit's noise."""
+        """Return a sentence for each target that the longest dwell does not reach by the unit's noise."""
         beyond = [t for t in (self.rule.targets if self.rule else ()) if mean_sd(t.noise, longest_s) > t.target_sd]
         return tuple(
             f"stop_at: {t.channel} is known to {mean_sd(t.noise, longest_s):.3g} after the longest dwell of "
@@ -87,7 +88,7 @@ class DwellParameters(Parameters):
     )
 
     def with_rule(self, unit: Unit, least_s: float = 0.0) -> Self:
-        """The parameters with the rule by the unit's own noise; `least_s`: no dwell ends before it.
+        """Return the parameters with the rule by the unit's own noise; `least_s`: no dwell ends before it.
 
         Raises `BadParameter` where that noise is not known.
         """
@@ -101,23 +102,23 @@ class DwellParameters(Parameters):
         return None if self.stop_at is None else self.stop_at.rule
 
     def dwell_warnings(self, stations: Sequence[Station]) -> tuple[str, ...]:
-        """Targets that the longest dwell of a schedule does not reach by the unit's noise."""
+        """Return a sentence for each target that the longest dwell of a schedule does not reach by the unit's noise."""
         longest_s = max((s.record_s for s in stations), default=0.0)
         return () if self.stop_at is None else self.stop_at.warnings(longest_s)
 
 
 def expected_stations(stations: Sequence[Station]) -> tuple[Station, ...]:
-    """The stations with the dwells that their rules are expected to make of them, for plans."""
+    """Return the stations with the dwells that their rules are expected to make of them, for plans."""
     return tuple(s if s.until is None else replace(s, record_s=expected_s(s.until, s.record_s)) for s in stations)
 
 
 def saved_tables(saved: DwellsSaved | None) -> tuple[Table, ...]:
-    """The table of `saved_table`, or none where dwells lasted their time."""
+    """Return the table of `saved_table`; nothing where dwells lasted their time."""
     return () if saved is None else (saved_table(saved),)
 
 
 def saved_table(saved: DwellsSaved) -> Table:
-    """Durations of the dwells under the rule, and what it saved."""
+    """Return the table of the dwells' durations under the rule, and of the time that it saved."""
     rows = tuple((d.label, d.duration_s, d.longest_s, "the rule" if d.by_rule else "its time") for d in saved.dwells)
     note = (
         f"The stop rule saved {saved.saved_s:.0f} s, {100.0 * saved.share:.0f} % of the longest dwells. It looks at "

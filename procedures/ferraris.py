@@ -6,7 +6,7 @@ from pydantic import Field
 
 from procedures.analysis.calibration.summary import TriadSummary
 from procedures.analysis.calibration.table_errors import TableUncertainty
-from procedures.analysis.calibration.triad_analysis import analyse_means
+from procedures.analysis.calibration.triad_analysis import analyse_means, suspected
 from procedures.analysis.own_axes import own_axis_check
 from procedures.analysis.turns.ferraris import analyse_ferraris, rest_means
 from procedures.analysis.turns.summary import WholeTurns
@@ -43,9 +43,10 @@ class Result(Outcome):
 def calibrated(
     recordings: Sequence[Recording], site: Site, table: TableUncertainty, unit: Unit | None, limits: FerrarisLimits
 ) -> Result:
-    """Both triads. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    """Return the calibration of both triads, with checks. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
     gyro = analyse_ferraris(recordings, site, table, unit.gyro if unit else None)
-    force, _ = analyse_means(rest_means(recordings), site, table, unit.accelerometer if unit else None)
+    at_rest = analyse_means(rest_means(recordings), site, table, unit.accelerometer if unit else None)
+    (force,) = suspected([at_rest])
     checks = (*_gyro_checks(gyro, limits), *_force_checks(force, limits))
     known = (("gyro", gyro.noise_known), ("accelerometer", force.noise_known))
     warnings = tuple(
@@ -57,12 +58,12 @@ def calibrated(
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """Calibrations of both triads."""
+    """Return the calibrations of both triads in a result."""
     return result.gyro.calibration, result.accelerometer.calibration
 
 
 def report(result: Result) -> Report:
-    """Coefficients of both triads, budgets, residuals and magnitudes."""
+    """Return the report: coefficients of both triads, budgets, residuals and magnitudes."""
     note = "U = b + K·ω: b from the rests and the sums of turns there and back, K from their differences."
     force = result.accelerometer
     tables = (

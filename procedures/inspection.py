@@ -29,7 +29,7 @@ from procedures.procedure import (
 
 
 def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording], params: P, context: Context) -> R:
-    """`Procedure.analyse` on inspected recordings. Raises `DomainError`.
+    """Return the result of `Procedure.analyse` on inspected recordings. Raises `DomainError`.
 
     Where the bench declares that its encoders are the better witness, the stations stand at the measured angles, and
     the first warning says so.
@@ -42,7 +42,9 @@ def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording
 
 
 def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Unit | None) -> R:
-    """Run `Method.analyse` on inspected recordings, or on the requested stretch of them. Raises `DomainError`."""
+    """Return the result of `Method.analyse` on inspected recordings, or on the requested stretch of them. Raises
+    `DomainError`.
+    """
     recordings = _stretches(evidence.recordings, params)
 
     def analyse(watched: Sequence[Recording]) -> R:

@@ -30,7 +30,7 @@ Part = Literal["gyros", "accelerometers", "all", "none"]
 
 
 class NoiseParameters(JudgedParameters):
-    """Steps of the analysis, each can be switched; what it changes is in the result's table of steps."""
+    """Steps of the analysis, each of which can be switched off; the effect of each is in the result's table."""
 
     cell_s: float = Field(1.0, gt=0.0, le=3600.0, description="cell whose means the slow part works on")
     full_rate: bool = Field(True, description="also use what is faster than a cell, where the noise model describes it")
@@ -55,7 +55,7 @@ class NoiseParameters(JudgedParameters):
     noise_limits: NoiseLimits = Field(default_factory=lambda: NoiseLimits.model_validate({}))
 
     def settings(self) -> LaunchSettings:
-        """Convert to the settings of the numerics."""
+        """Return the settings of the numerics."""
         return LaunchSettings(
             cell_s=self.cell_s,
             fast=self.full_rate,

@@ -64,14 +64,14 @@ class FitParameters(JudgedParameters):
     )
 
     def terms_for(self, triad: str) -> tuple[Kind, ...]:
-        """The terms that are asked of a triad, each once."""
+        """Return the further terms that are asked of a triad, each once."""
         own = ACCELEROMETER_TERMS if triad == "accelerometer" else ("g_sensitivity",)
         return tuple(kind for kind in dict.fromkeys(self.terms) if kind in own)
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """Inputs of one triad at the positions, and what is not exact about them."""
+    """Inputs of one triad at the positions, and the uncertainty of them."""
 
     vectors: Array
     """Shape (n, 3), unit's axes [SI]."""
@@ -112,7 +112,7 @@ class Result(Outcome):
 def inputs_at(
     triads: Sequence[str], angles: Sequence[TableAngles], site: Site, uncertainty: TableUncertainty
 ) -> dict[str, Inputs]:
-    """Inputs of the triads at table angles (n) and what the table makes of them, by triad."""
+    """Return, by triad, the inputs at table angles (n) and their uncertainty by the table."""
     forces = reference_vectors("accelerometer", angles, site)
     found: dict[str, Inputs] = {}
     for triad in triads:
@@ -123,7 +123,7 @@ def inputs_at(
 
 
 def predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
-    """Predicted uncertainties of the twelve coefficients of a plan; none where the noise is not known."""
+    """Return the predicted uncertainties of the twelve coefficients of a plan; none where the noise is not known."""
     parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
     if parts is None:
         return []
@@ -196,23 +196,25 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 
 
 def quantities(params: FitParameters) -> tuple[str, ...]:
-    """Checks and coefficients that a result will have."""
+    """Return the names of the checks and coefficients that a result will have."""
     checks = (" condition number", OWN_AXES, " residuals, p-value of chi-square")
     return tuple(f"{triad}{n}" for triad in params.triads for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 
 
 def report(result: Result) -> Report:
-    """Coefficients, further terms, checks, residuals and magnitudes."""
+    """Return the report: coefficients, further terms, checks, thermal correction where it was applied, residuals and
+    magnitudes.
+    """
     magnitudes = [t.magnitudes for t in result.triads]
     tables = [pictures.triad_table(t) for t in result.triads]
     tables += [_term_table(e) for e in result.extended]
     tables += [pictures.budget_table(t.calibration.triad, t.budgets) for t in result.triads if t.budgets]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the positions")]
+    thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
-    return Report(
-        sections=(*tables, *saved_tables(result.dwells), *figures, *(pictures.station_table(m) for m in magnitudes))
-    )
+    stations = [pictures.station_table(m) for m in magnitudes]
+    return Report(sections=(*tables, *saved_tables(result.dwells), *thermal, *figures, *stations))
 
 
 def _extended(triad: str, means: StationMeans, fit: ExtraFit) -> Extended:
@@ -227,7 +229,9 @@ def _of(extended: Sequence[Extended], summary: TriadSummary) -> Extended | None:
 def triad_checks(
     t: TriadSummary, in_run_maximum: float, condition_max: float, residual_p_value_min: float
 ) -> list[Check]:
-    """Checks of a triad's calibration: error per axis in sample, condition, and residuals by p-value or misfit."""
+    """Return the checks of a triad's calibration: error per axis in sample, condition, and residuals by p-value or
+    misfit.
+    """
     triad, m = t.calibration.triad, t.magnitudes
     unit, size = units.DISPLAY[m.unit]
     checks = [

@@ -15,7 +15,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def filled(self, defaults: Mapping[str, Any]) -> Self:
-        """Copy the parameters with each None replaced by its default, where there is one."""
+        """Return the parameters with each None replaced by its default, where there is one."""
         return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
 
 
@@ -34,7 +34,7 @@ class DecisionRules(Parameters):
     )
 
     def of(self, check: str) -> Rule:
-        """The rule of a check."""
+        """Return the decision rule of the check with this name."""
         return Rule(self.by_check.get(check, self.rule), self.guard, self.coverage_probability)
 
     def require_known(self, checks: Sequence[str]) -> None:
@@ -45,7 +45,7 @@ class DecisionRules(Parameters):
 
 
 class JudgedParameters(Parameters):
-    """Base of the parameters of what gives a verdict."""
+    """Base of the parameters of procedures and methods that give a verdict: the decision rules."""
 
     decision: DecisionRules | None = Field(
         None,

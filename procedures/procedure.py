@@ -1,4 +1,4 @@
-"""Interface of a catalogue file: a procedure is three functions and a little around them."""
+"""Interface of a catalogue file: `Procedure` or `Method`, with the values that they take and give."""
 
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, replace
@@ -77,7 +77,9 @@ class Context:
     """The mounting of the unit on the bench; None: nobody has entered one, the bench's declared azimuth counts."""
 
     def on(self, mounting: Mounting) -> "Context":
-        """This context with a mounting, whose azimuth and its uncertainty replace those that the bench declares."""
+        """Return this context with a mounting, whose azimuth and its uncertainty replace those that the bench
+        declares.
+        """
         azimuth = {"azimuth_deg": mounting.azimuth_deg, "azimuth_sd_arcsec": mounting.azimuth_sd_arcsec}
         return replace(self, bench=replace(self.bench, site=replace(self.bench.site, **azimuth)), mounting=mounting)
 
@@ -95,7 +97,7 @@ class PredictedUncertainty:
     """The check or named estimate of the result that this is about, where its name is not `name`; kept out of JSON."""
 
     def about(self, quantity: str) -> bool:
-        """True if this is the uncertainty of a quantity of the result."""
+        """Return whether this is the uncertainty of the quantity with this name."""
         return quantity == (self.quantity or self.name)
 
 
@@ -123,13 +125,13 @@ class DatedCalibration:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Input of a method: recordings and calibrations."""
+    """Inputs of a method: recordings and calibrations that are stored."""
 
     recordings: tuple[Recording, ...] = ()
     calibrations: tuple[DatedCalibration, ...] = ()
 
     def one_each(self) -> dict[str, TriadCalibration]:
-        """The given calibrations by triad. Raises `BadParameter` where two are of one triad."""
+        """Return the given calibrations by triad. Raises `BadParameter` where two are of one triad."""
         found: dict[str, TriadCalibration] = {}
         for calibration in (c for dated in self.calibrations for c in dated.triads):
             if calibration.triad in found:
@@ -139,7 +141,7 @@ class Evidence:
         return found
 
     def calibrations_of(self, unit: Unit | None, triads: Sequence[str]) -> tuple[dict[str, TriadCalibration], str]:
-        """The given calibrations by triad, else the unit's current ones, and the basis as a result names it.
+        """Return the given calibrations by triad, else the unit's current ones, and the basis as a result names it.
 
         Raises `BadParameter` where one of `triads` has none, and `NoCalibration` as `Unit.calibration`.
         """
@@ -242,7 +244,9 @@ class Procedure(Generic[P, R]):
 
 @dataclass(frozen=True)
 class Method(Generic[P, R]):
-    """A method of analysing existing recordings or calibrations; needs no bench."""
+    """A method of analysing existing recordings or calibrations; needs no bench: its parameters, its functions, its
+    version.
+    """
 
     name: str
     title: str

@@ -71,7 +71,7 @@ async def _require_swinging(table: Turntable, sinusoid: Sinusoid) -> None:
 
 
 class EncoderRows:
-    """Readings of the axes put beside samples, as the channels of `ENCODER_CHANNELS`."""
+    """Puts readings of the table's axes with the samples of a unit, as the channels of `ENCODER_CHANNELS`."""
 
     def __init__(self, start_s: float, rate_hz: float) -> None:
         """Set up; `start_s`: bench time of the first sample's beginning [s]."""
@@ -90,7 +90,9 @@ class EncoderRows:
         return float(self._kept.time_s[-1]) if len(self._kept.time_s) else -inf
 
     def beside(self, count: int, fresh: EncoderTrace) -> NDArray[np.int32]:
-        """Rows of the next samples, (count, 5) counts: the newest reading at each one's end. Raises `DeviceFault`."""
+        """Return the encoder rows of the next samples, (count, 5) counts: the newest reading at each one's end. Raises
+        `DeviceFault`.
+        """
         ends = self._start_s + (self._rows + 1.0 + np.arange(count)) / self._rate_hz
         self._rows += count
         kept = appended(self._kept, fresh)

@@ -43,7 +43,7 @@ class SiteParameters(JudgedParameters):
     )
 
     def site(self, context: Context) -> Site:
-        """The bench's site with the values that these parameters override."""
+        """Return the bench's site with the values that these parameters override."""
         found = site_with(
             context.bench.site, self.latitude_deg, self.gravity_m_s2, self.azimuth_deg, self.azimuth_sd_arcsec
         )
@@ -78,7 +78,9 @@ class TableParameters(SiteParameters):
     )
 
     def table(self, site: Site) -> TableUncertainty:
-        """Uncertainty of the reference due to table and site; zero for what neither bench nor parameters declare."""
+        """Return the uncertainty of the reference due to table and site; zero for what neither bench nor parameters
+        declare.
+        """
         return TableUncertainty(
             self.orthogonality_sd_arcsec or 0.0,
             self.pointing_sd_arcsec or 0.0,
@@ -111,7 +113,7 @@ class TableParameters(SiteParameters):
 
 
 def declared_site(context: Context) -> dict[str, float]:
-    """Site values declared by the bench, for `Parameters.filled`."""
+    """Return the site values that the bench declares, for `Parameters.filled`."""
     site = context.bench.site
     return {
         "latitude_deg": site.latitude_deg,
@@ -122,7 +124,7 @@ def declared_site(context: Context) -> dict[str, float]:
 
 
 def declared_table(context: Context) -> dict[str, float]:
-    """Site and table values declared by the bench, for `Parameters.filled`."""
+    """Return the site and table values that the bench declares, for `Parameters.filled`."""
     accuracy = context.bench.accuracy
     return {
         **declared_site(context),

@@ -20,7 +20,7 @@ Blocks = AsyncIterator[NDArray[np.int32]]
 
 @asynccontextmanager
 async def taken(blocks: Blocks) -> AsyncGenerator[Blocks]:
-    """Run the block with a stream's blocks; the stream is closed at its end, whoever stops first."""
+    """Run the block with a stream's blocks; the stream is closed at its end, also where the block stops first."""
     try:
         yield blocks
     finally:
@@ -58,7 +58,9 @@ async def _until_enough(stream: Stream, rule: StopRule, longest_s: float) -> Blo
 
 
 async def switch_on(bench: Bench, station: Station) -> None:
-    """Switch the unit on at the station's voltage where it names one; no-op where it is on at that."""
+    """Switch the unit on at the station's voltage where it names one, and wait; no-op where it is on at that. Raises
+    `DeviceFault`, `Disconnected`.
+    """
     if station.supply_voltage_v is not None:
         await bench.supply.set_output(station.supply_voltage_v, bench.supply.limits.nominal_a)
     await bench.supply.switch_on()

@@ -16,7 +16,9 @@ ACCELERATION_SHARE = 0.9
 
 
 def default_ramp_s(rate_deg_s: float, bench: BenchDescription, share: float = ACCELERATION_SHARE) -> float:
-    """Least ramp to a rate within a share of the outer axis' acceleration, rounded up to a tenth of a second [s]."""
+    """Return the least ramp to a rate within a share of the outer axis' acceleration, rounded up to a tenth of a second
+    [s].
+    """
     return ceil(10.0 * (PEAK_ACCELERATION * rate_deg_s / (share * bench.outer.acceleration_deg_s2))) / 10.0
 
 

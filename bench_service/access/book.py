@@ -27,7 +27,9 @@ log = logging.getLogger(__name__)
 
 
 class AccessBook:
-    """The state of access of one process."""
+    """Accounts, tokens and sessions in the memory of one process, kept up to date by a thread; authentication reads
+    them without the database.
+    """
 
     def __init__(self, store: AccessStore) -> None:
         """Set up and read the state. Raises `StorageFailure`."""
@@ -44,7 +46,7 @@ class AccessBook:
 
     @property
     def state(self) -> Snapshot:
-        """The newest known state."""
+        """The newest known state of accounts, tokens and sessions."""
         return self._state
 
     @property
@@ -53,19 +55,19 @@ class AccessBook:
         return bool(self._state.accounts)
 
     def begin(self) -> None:
-        """Begin to follow the changes of other processes."""
+        """Start the thread that follows the changes of other processes."""
         self._thread = Thread(target=self._run, name="access", daemon=True)
         self._thread.start()
 
     def end(self) -> None:
-        """End the thread; one that hangs in the database is left."""
+        """End the thread and wait for it, within a limit; one that hangs in the database is left."""
         self._ending = True
         self._woken.set()
         if self._thread is not None:
             self._thread.join(LEAVE_S)
 
     def read_again(self) -> None:
-        """Read the state now, after a change of this process. Raises `StorageFailure`."""
+        """Read the state from the database now, after a change of this process. Raises `StorageFailure`."""
         self._take(self._store.load())
 
     def _take(self, state: Snapshot) -> None:
@@ -88,15 +90,17 @@ class AccessBook:
         return waiting
 
     def account(self, name: str) -> Account | None:
-        """The account of a name."""
+        """Return the account of a name; None where there is none."""
         return self._state.accounts.get(name)
 
     def token(self, digest: str) -> AccessToken | None:
-        """The token of a digest, valid or expired; None for one that is unknown or revoked."""
+        """Return the token of a digest, valid or expired; None for one that is unknown or revoked."""
         return self._state.tokens.get(digest)
 
     def session(self, digest: str) -> Session | None:
-        """The session of a digest with its last use, valid or not; None for one that is unknown or was ended."""
+        """Return the session of a digest with its last use, valid or expired; None for one that is unknown or was
+        ended.
+        """
         found = self._state.sessions.get(digest)
         used = self._used.get(digest)
         if found is None or used is None or used <= found.last_used_at:
@@ -104,7 +108,7 @@ class AccessBook:
         return replace(found, last_used_at=used)
 
     def note_use(self, session: str | None = None, token: str | None = None) -> None:
-        """Note that a session (digest) or a token (id) was used now."""
+        """Remember that a session (digest) or a token (id) was used now; the thread stores it later."""
         if session is not None:
             self._used[session] = now()
         if token is not None:

@@ -20,12 +20,12 @@ IDLE = timedelta(hours=12)
 LONGEST = timedelta(days=7)
 """Time after which a session ends, used or not."""
 STOPS_AFTER_END = timedelta(days=7)
-"""Time for which a session that has ended by itself still stops a bench: a page that was left open."""
+"""Time after its expiry for which a session may still stop a bench, for a page that was left open."""
 
 
 @dataclass(frozen=True)
 class Account:
-    """The account of a person."""
+    """The account of a person: name, role, team; the hash of the password is kept apart."""
 
     name: str
     role: Role
@@ -38,7 +38,7 @@ class Account:
 
 @dataclass(frozen=True)
 class AccessToken:
-    """A named token of a program, without its secret."""
+    """A named token of a program, with role and team; of its secret only the digest."""
 
     id: str
     name: str
@@ -52,13 +52,13 @@ class AccessToken:
     last_used_at: datetime | None = None
 
     def valid(self, at: datetime) -> bool:
-        """Return whether it is neither revoked nor expired."""
+        """Return whether the token is neither revoked nor expired at that moment."""
         return self.revoked_at is None and at < self.expires_at
 
 
 @dataclass(frozen=True)
 class Session:
-    """A person's session, without its secret."""
+    """A person's session after a log-in, with its times; of its secret only the digest."""
 
     digest: str = field(repr=False)
     account: str
@@ -71,29 +71,31 @@ class Session:
         return min(self.last_used_at + IDLE, self.created_at + LONGEST)
 
     def valid(self, at: datetime) -> bool:
-        """Return whether it has not ended by itself."""
+        """Return whether the session has not expired at that moment, by its last use or its age."""
         return at < self.over_at
 
     def stops(self, at: datetime) -> bool:
-        """Return whether it still stops a bench: a page left open over a weekend does."""
+        """Return whether the session may still stop a bench, also for some days after it expired."""
         return at < self.over_at + STOPS_AFTER_END
 
 
 def new_token() -> str:
-    """Make the secret of a token."""
+    """Return a new secret of a token: the prefix and 256 random bits."""
     return PREFIX + secrets.token_urlsafe(32)
 
 
 def new_session_secret() -> str:
-    """Make the secret of a session, the value of its cookie."""
+    """Return a new secret of a session, 256 random bits, the value of its cookie."""
     return secrets.token_urlsafe(32)
 
 
 def digest_of(secret: str) -> str:
-    """The digest under which a secret is kept."""
+    """Return the SHA-256 digest, in hexadecimal, under which a secret is kept."""
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
 def csrf_of(key: bytes, subject: str) -> str:
-    """The value that the pages of a session repeat with each change: nobody can make it who cannot read a page."""
+    """Return the value that the pages of a session repeat with each change: nobody can make it who cannot read a
+    page.
+    """
     return hmac.new(key, f"csrf:{subject}".encode(), "sha256").hexdigest()

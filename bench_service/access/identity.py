@@ -23,7 +23,7 @@ class Proof(StrEnum):
 
 @dataclass(frozen=True)
 class Identity:
-    """One person or program, as a request has proved it."""
+    """One person or program, as a request has proved it: name, role, team, and the kind of proof."""
 
     name: str
     role: Role
@@ -43,14 +43,20 @@ class Identity:
         return self.name if self.proven else None
 
     def may(self, right: Right) -> bool:
-        """Return whether it has a right. Accounts and tokens are not given to somebody who has proved nothing."""
+        """Return whether the identity has a right. Accounts and tokens are not given to somebody who has proved
+        nothing.
+        """
         return has(self.role, right) and (right is not Right.ACCESS or self.proof is not Proof.NONE)
 
     def in_team(self, team: str) -> bool:
-        """Return whether it may act on what a team has reserved; a reservation without a team is everybody's."""
+        """Return whether the identity may act on what a team has reserved; a reservation without a team is
+        everybody's.
+        """
         return not team or self.in_every_team or self.team == team
 
     @property
     def in_every_team(self) -> bool:
-        """Return whether it may act for every team: an admin, or the single user of a service without accounts."""
+        """True where the identity may act for every team: an admin, or the single user of a service without
+        accounts.
+        """
         return not self.proven or RANK[self.role] >= RANK[Role.ADMIN]

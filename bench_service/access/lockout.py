@@ -17,14 +17,16 @@ ADDRESSES = 4096
 
 
 def locked_until(failures: int, last_at: datetime) -> datetime | None:
-    """The end of a name's lock after failures in a row; None where it is not locked."""
+    """Return the end of a name's lock after failures in a row, of which the last was at `last_at`; None where it is not
+    locked.
+    """
     if failures < FREE:
         return None
     return last_at + min(FIRST * 2 ** min(failures - FREE, 10), LONGEST)
 
 
 class AttemptRate:
-    """Attempts of each address within the last minute."""
+    """Counter of the log-in attempts of each address within the last minute, in the memory of one process."""
 
     def __init__(self) -> None:
         self._mutex = Lock()

@@ -31,13 +31,17 @@ def check_rule(name: str, password: str) -> None:
 
 
 def hashed(password: str) -> str:
-    """Hash a password. Raises `Overloaded`."""
+    """Return the argon2id hash of a password. Takes a good part of a second. Raises `Overloaded` where too many are
+    hashed at once.
+    """
     with _Turn():
         return _hasher().hash(password)
 
 
 def matches(password: str, stored: str | None) -> bool:
-    """Return whether a password is the one of a hash; without a hash it takes as long, and is none."""
+    """Return whether a password is the one of a hash; without a hash it takes as long, and returns False. Raises
+    `Overloaded`.
+    """
     from argon2.exceptions import InvalidHashError, VerificationError
 
     with _Turn():

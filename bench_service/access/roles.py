@@ -4,7 +4,7 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """The four roles, from the least to the most; each has the rights of those before it."""
+    """Roles in ascending order; each has the rights of those before it."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
@@ -13,7 +13,7 @@ class Role(StrEnum):
 
 
 class Right(StrEnum):
-    """The right that a route needs."""
+    """The right that a route needs, or that nobody needs; `LEAST` has the least role with each."""
 
     OPEN = "open"
     """Everybody, also without log-in: health, the log-in itself."""
@@ -45,6 +45,6 @@ LEAST: dict[Right, Role | None] = {
 
 
 def has(role: Role, right: Right) -> bool:
-    """Return whether a role has a right."""
+    """Return whether a role has a right; everybody has `Right.OPEN`."""
     least = LEAST[right]
     return least is None or RANK[role] >= RANK[least]

@@ -1,4 +1,4 @@
-"""The verbs of access: log in and out, keep accounts, tokens and approvals."""
+"""Operations of access: log in and out, keep accounts, tokens and approvals."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ RESERVED = (SERVICE_TOKEN, "retention", "local")
 
 @dataclass(frozen=True)
 class NewSession:
-    """A session that a log-in has made, with its secret."""
+    """A session that a log-in has made, with its secret and its account."""
 
     secret: str
     session: Session
@@ -40,14 +40,14 @@ class NewSession:
 
 @dataclass(frozen=True)
 class NewToken:
-    """A token that was made, with its secret, which nobody can read again."""
+    """A token that was made, with its secret, which cannot be read again."""
 
     secret: str
     token: AccessToken
 
 
 class AccessService:
-    """Accounts, tokens, sessions and approvals, for clients."""
+    """Operations of clients on accounts, tokens, sessions and approvals; each is stored when it returns."""
 
     def __init__(self, store: AccessStore, book: AccessBook) -> None:
         self.book = book
@@ -82,7 +82,7 @@ class AccessService:
         return NewSession(secret, session, account)
 
     def csrf_of_session(self, session: Session) -> str:
-        """The value that the pages of a session repeat with each change."""
+        """Return the value that the pages of a session repeat with each change, against cross-site requests."""
         return csrf_of(self.book.state.key, f"session {session.digest}")
 
     def log_out(self, identity: Identity) -> None:
@@ -95,7 +95,9 @@ class AccessService:
         self.book.read_again()
 
     def add_account(self, name: str, role: Role, team: str, password: str | None, by: str) -> Account:
-        """Add an account; the first one switches log-in on, and is an admin's. Raises `NameTaken`, `BadParameter`."""
+        """Store an account and return it; the first one switches log-in on, and is an admin's. Raises `NameTaken`,
+        `BadParameter`.
+        """
         _check_free(name)
         if password is not None:
             passwords.check_rule(name, password)
@@ -105,7 +107,8 @@ class AccessService:
         return account
 
     def change_account(self, name: str, role: Role | None, team: str | None, password: str | None) -> Account:
-        """Change role, team or password; a new password ends the open sessions and unlocks the name.
+        """Change role, team or password of an account, and return it; a new password ends the open sessions and unlocks
+        the name.
 
         Raises `NotFound`, `BadParameter`, `IllegalTransition` for the role of the last admin.
         """
@@ -125,7 +128,9 @@ class AccessService:
         self.book.read_again()
 
     def add_token(self, name: str, role: Role, team: str, lasting: timedelta, by: str) -> NewToken:
-        """Make a token. Raises `NameTaken`, `BadParameter`."""
+        """Make and store a token that expires after `lasting`, and return it with its secret. Raises `NameTaken`,
+        `BadParameter`.
+        """
         _check_free(name)
         secret, at = new_token(), now()
         token = AccessToken(new_id(), name, role, team, digest_of(secret), at, by, at + lasting)
@@ -134,27 +139,29 @@ class AccessService:
         return NewToken(secret, token)
 
     def tokens(self) -> tuple[AccessToken, ...]:
-        """List every token, newest first."""
+        """Return every token, newest first, revoked ones too."""
         return self._store.tokens()
 
     def revoke_token(self, token: str) -> AccessToken:
-        """Revoke a token by its id or name; jobs that were submitted with it continue. Raises `NotFound`."""
+        """Revoke a token by its id or name, and return it; jobs that were submitted with it continue. Raises
+        `NotFound`.
+        """
         revoked = self._store.revoke_token(token, now())
         self.book.read_again()
         return revoked
 
     def approve(self, procedure: str, version: str, by: str) -> Approval:
-        """Approve a procedure's version for operators."""
+        """Store the approval of a procedure's version for operators, and return it."""
         approval = Approval(procedure, version, by, now())
         self._store.approve(approval)
         return approval
 
     def withdraw(self, procedure: str) -> None:
-        """Withdraw the approval of a procedure. Raises `NotFound`."""
+        """Withdraw the approval of a procedure. Raises `NotFound` where there is none."""
         self._store.withdraw(procedure)
 
     def approvals(self) -> tuple[Approval, ...]:
-        """List the approvals by procedure."""
+        """Return the approvals, in the order of the procedures' names."""
         return self._store.approvals()
 
     def require_approved(self, identity: Identity, procedure: str, version_of: Callable[[], str]) -> None:
@@ -175,7 +182,7 @@ class AccessService:
         )
 
     def still_valid(self, identity: Identity, at: datetime) -> bool:
-        """Return whether the credential behind an identity still counts: for answers that last long."""
+        """Return whether the credential behind an identity is still valid at a moment: for answers that last long."""
         state = self.book.state
         if identity.proof is Proof.SESSION:
             session = self.book.session(identity.credential)

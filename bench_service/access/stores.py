@@ -1,4 +1,4 @@
-"""PORT of memory for accounts, tokens, sessions and approvals. Every method is one transaction."""
+"""Interface of the store of accounts, tokens, sessions and approvals. Every method is one transaction."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from bench_service.telemetry.stores import TelemetryStores
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything that authentication needs, at one moment: it is kept in memory."""
+    """All accounts, tokens and sessions at one moment, as authentication keeps them in memory."""
 
     revision: int = -1
     key: bytes = field(default=b"", repr=False)
@@ -36,24 +36,27 @@ class Approval:
 
 
 class AccessStore(Protocol):
-    """The stored accounts, tokens, sessions and approvals. All but `touch` raise `StorageFull`, `StorageFailure`."""
+    """Store of accounts, tokens, sessions and approvals. All but `touch` raise `StorageFull`, `StorageFailure`.
+    Interface; the SQL is in `persistence`.
+    """
 
     def revision(self) -> int:
-        """Number of changes so far."""
+        """Return the number of changes so far, by which other processes see that they must read again."""
         ...
 
     def load(self) -> Snapshot: ...
 
     def add_account(self, account: Account, password_hash: str | None) -> None:
-        """Add an account. Raises `NameTaken`; and `IllegalTransition` where the first one is no admin's."""
+        """Store an account. Raises `NameTaken`; and `IllegalTransition` where the first one is no admin's."""
         ...
 
     def password_hash(self, name: str) -> str | None:
-        """The hash of an account's password; None where there is no account or no password."""
+        """Return the hash of an account's password; None where there is no account or no password."""
         ...
 
     def change_account(self, name: str, role: Role | None, team: str | None, password_hash: str | None) -> Account:
-        """Change what is given; a new password ends the account's sessions and its lock.
+        """Change the fields that are given, and return the account; a new password ends the account's sessions and its
+        lock.
 
         Raises `NotFound`, `IllegalTransition` for the last admin's role.
         """
@@ -66,48 +69,52 @@ class AccessStore(Protocol):
         ...
 
     def add_token(self, token: AccessToken) -> None:
-        """Add a token. Raises `NameTaken` where a valid token or an account has that name."""
+        """Store a token. Raises `NameTaken` where a valid token or an account has that name."""
         ...
 
     def tokens(self) -> tuple[AccessToken, ...]:
-        """List every token, newest first, revoked ones too."""
+        """Return every token, newest first, revoked ones too."""
         ...
 
     def revoke_token(self, token: str, at: datetime) -> AccessToken:
-        """Revoke a token by its id or its name; one that is revoked stays as it is. Raises `NotFound`."""
+        """Revoke a token by its id or its name, and return it; one that is revoked stays as it is. Raises
+        `NotFound`.
+        """
         ...
 
     def add_session(self, session: Session, instead_of: str | None) -> None:
-        """Add a session, and end the one that the same browser had (its digest)."""
+        """Store a session, and end the one that the same browser had (its digest)."""
         ...
 
     def end_session(self, digest: str) -> None: ...
 
     def touch(self, sessions: Mapping[str, datetime], tokens: Mapping[str, datetime]) -> None:
-        """Note when sessions (by digest) and tokens (by id) were last used."""
+        """Store when sessions (by digest) and tokens (by id) were last used."""
         ...
 
     def begin_attempt(self, name: str, at: datetime) -> datetime | None:
-        """Count an attempt as failed until `forget_attempts`; where the name is locked, the end of its lock instead."""
+        """Count an attempt as failed until `forget_attempts`, and return None; where the name is locked, return the end
+        of its lock instead.
+        """
         ...
 
     def forget_attempts(self, name: str) -> None: ...
 
     def approve(self, approval: Approval) -> None:
-        """Approve a version of a procedure, in place of the one before."""
+        """Store the approval of a version of a procedure, in place of the one before."""
         ...
 
     def withdraw(self, procedure: str) -> None:
-        """Withdraw a procedure's approval. Raises `NotFound`."""
+        """Remove the approval of a procedure. Raises `NotFound` where there is none."""
         ...
 
     def approvals(self) -> tuple[Approval, ...]:
-        """List the approvals by procedure."""
+        """Return the approvals, in the order of the procedures' names."""
         ...
 
 
 @dataclass(frozen=True)
 class AccessStores(TelemetryStores):
-    """The stores of this room and of those below it."""
+    """The stores that `access` needs, with those of `telemetry`, as one value."""
 
     access: AccessStore

@@ -7,7 +7,7 @@ from datetime import datetime
 from functools import partial
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -27,12 +27,13 @@ from bench_service.api.http.errors import FieldError, problems, respond
 from bench_service.background import WorkInOrder
 from bench_service.formats.plain_json import faults, mended, shown
 from bench_service.mapping import copied
+from bench_service.routing import Routes
 from bench_service.telemetry.audit import AuditEntry, AuditTrail, write
 from bench_service.telemetry.log_context import request_id
 from bench_service.telemetry.redaction import without_tokens
 from bench_service.wall_clock import new_id, now
 
-router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
+router = Routes(prefix="/api/v1/audit", tags=["audit"])
 
 READING = ("GET", "HEAD", "OPTIONS")
 NOTED_BYTES = 8192
@@ -90,7 +91,9 @@ log = logging.getLogger(__name__)
 
 
 class Audited:
-    """ASGI middleware: performs the act, writes its audit entry, then answers. See `bench_service.telemetry.audit`."""
+    """ASGI middleware that lets a route do the act, writes its audit entry, and then sends the answer. See
+    `bench_service.telemetry.audit`.
+    """
 
     def __init__(self, app: ASGIApp, trail: AuditTrail) -> None:
         self._app = app

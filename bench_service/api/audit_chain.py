@@ -4,18 +4,19 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from pydantic import AwareDatetime, BaseModel, Field
 
 from bench_service.api.http.dependencies import ClientName, Service
 from bench_service.api.http.errors import problems
 from bench_service.api.http.fields import Request
 from bench_service.mapping import copied
+from bench_service.routing import Routes
 from bench_service.telemetry.audit_chain import ChainReport, Checkpoint
 from bench_service.wall_clock import now
 from procedures.core.errors import BadParameter
 
-router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
+router = Routes(prefix="/api/v1/audit", tags=["audit"])
 
 Expected = Annotated[
     str | None,
@@ -41,7 +42,7 @@ class CheckpointView(BaseModel):
 
 
 class ChainView(BaseModel):
-    """The outcome of a check of the whole chain."""
+    """Outcome of a check of the whole chain of audit entries."""
 
     whole: bool = Field(description="Whether no entry was changed, removed or inserted")
     faults: list[str] = Field(description="Faults found, by entry; at most 20")

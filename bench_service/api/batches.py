@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from anyio import sleep, to_thread
-from fastapi import APIRouter, Query
+from fastapi import Query
 from fastapi.responses import StreamingResponse
 from pydantic import AwareDatetime, BaseModel, Field
 
@@ -19,10 +19,11 @@ from bench_service.mapping import copied
 from bench_service.model.batches import AnalysisBatch, AnalysisTask, BatchState, Grouping, Selection, TaskState
 from bench_service.model.job import Failure
 from bench_service.model.search import LabelSought, Search
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.limits import Verdict
 
-router = APIRouter(prefix="/api/v1/analyses/batches", tags=["analyses"])
+router = Routes(prefix="/api/v1/analyses/batches", tags=["analyses"])
 LOOK_S = 0.5
 """Interval at which a stream of a batch looks for progress [s]."""
 QUIET_LOOKS = 20
@@ -46,7 +47,7 @@ class RecordingSelection(Request):
     ids: list[str] = Field(default_factory=list[str], max_length=20_000, description="Only these recordings")
 
     def query(self) -> Selection:
-        """Convert to the query of the stores."""
+        """Return the conditions in the form that the stores take."""
         labels = tuple(map(LabelSought.parse, self.labels))
         return copied(Selection, self, search=copied(Search, self, labels=labels), ids=tuple(self.ids))
 
@@ -75,7 +76,17 @@ class BatchView(BaseModel):
     def of(cls, batch: AnalysisBatch) -> "BatchView":
         """Convert a batch to its HTTP view."""
         counts = {state: batch.counts.get(state, 0) for state in TaskState}
-        return copied(cls, batch, counts=counts, calibrations=list(batch.calibrations))
+        selection = _as_submitted(batch.selection)
+        return copied(cls, batch, counts=counts, calibrations=list(batch.calibrations), selection=selection)
+
+
+def _as_submitted(stored: dict[str, Any]) -> dict[str, Any]:
+    """Return a stored selection as its request had it: the conditions that it names, labels as `name=value`."""
+    flat = {key: value for key, value in stored.items() if key != "search"} | (stored.get("search") or {})
+    labels = [
+        one["name"] if one["value"] is None else f"{one['name']}={one['value']}" for one in flat.pop("labels", ())
+    ]
+    return {key: value for key, value in (flat | {"labels": labels}).items() if value not in (None, [], ())}
 
 
 class BatchPage(BaseModel):

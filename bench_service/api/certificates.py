@@ -3,16 +3,17 @@
 from typing import Annotated
 
 from anyio import to_thread
-from fastapi import APIRouter, File, UploadFile
+from fastapi import File, UploadFile
 from pydantic import BaseModel, Field
 
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
 from bench_service.evidence.certificate_check import CheckedTriad, check_certificate
 from bench_service.mapping import copied
+from bench_service.routing import Routes
 from procedures.core.errors import BadParameter
 
-router = APIRouter(prefix="/api/v1/certificates", tags=["units"])
+router = Routes(prefix="/api/v1/certificates", tags=["units"])
 LARGEST = 1_000_000
 """Largest certificate that is checked [bytes]."""
 

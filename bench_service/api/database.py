@@ -3,15 +3,15 @@
 from datetime import datetime
 from typing import Any
 
-from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from bench_service.api.http.dependencies import After, Limit, Service
 from bench_service.api.http.errors import problems
 from bench_service.mapping import copied
+from bench_service.routing import Routes
 from bench_service.telemetry.upkeep import UpkeepKind, UpkeepReport
 
-router = APIRouter(prefix="/api/v1/database", tags=["health"])
+router = Routes(prefix="/api/v1/database", tags=["health"])
 
 
 class UpkeepView(BaseModel):

@@ -1,13 +1,14 @@
 """Health routes for monitoring: liveness and readiness of the service."""
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from pydantic import BaseModel, Field
 
 from bench_service.api.access.identify import found_of
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
+from bench_service.routing import Routes
 
-router = APIRouter(tags=["health"])
+router = Routes(tags=["health"])
 
 
 class Health(BaseModel):

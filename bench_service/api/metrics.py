@@ -6,7 +6,7 @@ process's own.
 
 from collections.abc import Iterator
 
-from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi import FastAPI, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram, generate_latest
 from prometheus_client.core import (
     CounterMetricFamily,
@@ -22,11 +22,12 @@ from bench_service.api.http.errors import problems
 from bench_service.bench.live.values import BenchLive
 from bench_service.jobs.events.hub import EventHub
 from bench_service.model.job import FINAL, JobState
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from bench_service.telemetry.tallies import DURATION_S, NEVER_LEFT, Spread, Tallies
 from bench_service.wall_clock import monotonic_s, now
 
-router = APIRouter(tags=["health"])
+router = Routes(tags=["health"])
 
 BENCH_STATES = ("idle", "busy", "stopped", "offline")
 
@@ -47,7 +48,7 @@ def metrics(request: Request, service: Service, hub: Hub) -> Response:
 
 
 class Snapshot(Collector):
-    """All values of one scrape."""
+    """Collector of all metrics of one scrape, read from the service when Prometheus asks."""
 
     def __init__(self, service: BenchService, tallies: Tallies, hub: EventHub) -> None:
         self._service = service
@@ -55,7 +56,9 @@ class Snapshot(Collector):
         self._hub = hub
 
     def collect(self) -> Iterator[Metric]:
-        """Yield the metric families one after the other."""
+        """Yield the metric families: jobs, campaigns, benches, listeners, disk and database. Raises
+        `StorageFailure`.
+        """
         yield from self._jobs()
         yield from self._campaigns()
         yield from self._benches()
@@ -139,7 +142,7 @@ def _buckets(spread: Spread) -> list[tuple[str, float]]:
 
 
 def install(app: FastAPI, service: BenchService) -> None:
-    """Give an application its metrics registry, and measure its requests."""
+    """Give an application the registry of metrics at `app.state`, and have its requests measured."""
     registry = CollectorRegistry()
     app.state.tallies = Tallies(service.stores.tallies)
     app.state.request_metrics = registry

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import Query, Response
 from pydantic import AwareDatetime, BaseModel, Field
 
 from bench_service.access.service import require_team
@@ -14,9 +14,10 @@ from bench_service.bench.mountings import MountingEntry, new_mounting
 from bench_service.mapping import copied
 from bench_service.model.mountings import StoredMounting
 from bench_service.model.records import Idempotency
+from bench_service.routing import Routes
 from bench_service.wall_clock import now
 
-router = APIRouter(prefix="/api/v1/mountings", tags=["mountings"])
+router = Routes(prefix="/api/v1/mountings", tags=["mountings"])
 
 
 class MountingSubmission(Request):

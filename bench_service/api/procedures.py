@@ -2,7 +2,6 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter
 from fastapi import Request as HttpRequest
 from pydantic import BaseModel, Field, ValidationError
 
@@ -14,12 +13,13 @@ from bench_service.evidence.admission import Turns
 from bench_service.jobs.planning import Plan
 from bench_service.mapping import copied
 from bench_service.model.errors import ServiceError
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.errors import DomainError
 from procedures.core.recording import Station
 from procedures.procedure import Context, Method, Outcome, Parameters, PredictedUncertainty, Procedure
 
-router = APIRouter(prefix="/api/v1", tags=["procedures"])
+router = Routes(prefix="/api/v1", tags=["procedures"])
 
 
 PREVIEWS = Turns("previews", at_once=4, waiting=60)

@@ -4,7 +4,7 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from anyio import CapacityLimiter, to_thread
-from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
+from fastapi import File, Form, Query, Request, Response, UploadFile
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field, ValidationError
@@ -26,12 +26,13 @@ from bench_service.jobs.numbers import job_id_of
 from bench_service.mapping import copied
 from bench_service.model.raw_data import RawState
 from bench_service.model.records import RecordingState, StoredRecording
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
 from procedures.core.measured import Measured
 from procedures.core.recording import Channel, Station
 
-router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
+router = Routes(prefix="/api/v1/recordings", tags=["recordings"])
 
 
 class RecordingView(BaseModel):

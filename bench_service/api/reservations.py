@@ -3,7 +3,7 @@
 from datetime import datetime, timedelta
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import Query, Response
 from pydantic import AwareDatetime, BaseModel, Field, model_validator
 
 from bench_service.api.access.teams import TeamOfReservation
@@ -13,9 +13,10 @@ from bench_service.api.http.fields import NAME, Request
 from bench_service.jobs.queue_service import LONGEST, ReservationRequest
 from bench_service.jobs.reservation import Reservation, Reserved
 from bench_service.mapping import copied
+from bench_service.routing import Routes
 from bench_service.wall_clock import now
 
-router = APIRouter(prefix="/api/v1/reservations", tags=["reservations"])
+router = Routes(prefix="/api/v1/reservations", tags=["reservations"])
 
 
 class ReservationSubmission(Request):

@@ -4,7 +4,7 @@ from dataclasses import replace
 from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Response
+from fastapi import Query, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 
@@ -20,13 +20,14 @@ from bench_service.jobs.numbers import job_id_of
 from bench_service.mapping import copied
 from bench_service.model.batches import BatchRequest, Grouping
 from bench_service.model.records import StoredResult
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
 from procedures.core.mounting import Mounting
 from procedures.core.report import Figure, Table
 
-router = APIRouter(prefix="/api/v1", tags=["analyses"])
+router = Routes(prefix="/api/v1", tags=["analyses"])
 
 
 class AnalysisSubmission(Request):
@@ -61,7 +62,7 @@ class Lineage(BaseModel):
 
     @classmethod
     def of(cls, result: StoredResult) -> "Lineage":
-        """Take the lineage from a stored result."""
+        """Return the lineage of a stored result in its HTTP form."""
         recordings = [{"id": i, "content_hash": h} for i, h in result.recordings]
         return copied(cls, result, recordings=recordings, job=result.job_id, mounting=result.context.get("mounting"))
 

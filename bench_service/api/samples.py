@@ -1,4 +1,4 @@
-"""Routes of samples as people's tools read them: of one recording, and of a whole job as one zip."""
+"""Routes that export samples for other tools: those of one recording, and those of a whole job as one zip."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import Annotated, Any
 
 from anyio import to_thread
-from fastapi import APIRouter, Query
+from fastapi import Query
 from fastapi.responses import StreamingResponse
 
 from bench_service.api.http.admitted_stream import AdmittedStream, place_in_turn
@@ -24,10 +24,11 @@ from bench_service.formats.samples_out.sheet import LARGEST_FACTOR, Sheet, Treat
 from bench_service.formats.samples_out.sheet_files import SheetFormat, written
 from bench_service.model.errors import NotFound
 from bench_service.model.records import StoredRecording
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
 
-router = APIRouter(prefix="/api/v1", tags=["recordings"])
+router = Routes(prefix="/api/v1", tags=["recordings"])
 
 HELD = {SheetFormat.MATLAB: 32}
 """Times a chunk's raw bytes that an export holds; a .mat file is held as a whole."""
@@ -41,7 +42,7 @@ ZIP: dict[int | str, dict[str, object]] = {
 
 
 class Values(StrEnum):
-    """Values of samples: in SI, or as they are stored."""
+    """Kind of exported values: in SI units, or raw as they are stored."""
 
     PHYSICAL = "physical"
     RAW = "raw"

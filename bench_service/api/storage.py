@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from pydantic import BaseModel, Field
 
 from bench_service.api.http.dependencies import ClientName, ProvenName, Service
@@ -12,8 +12,9 @@ from bench_service.api.http.fields import Request
 from bench_service.api.recordings import RecordingView
 from bench_service.mapping import copied
 from bench_service.model.raw_data import Growth, Hold, Keeping, Prediction, RawPlan, RawState, Share, StorageReport
+from bench_service.routing import Routes
 
-router = APIRouter(prefix="/api/v1", tags=["health"])
+router = Routes(prefix="/api/v1", tags=["health"])
 
 
 class StorageView(BaseModel):

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import Response
 from pydantic import Field
 
 from bench_service.api.http.dependencies import IdempotencyKey, Service
@@ -10,11 +10,12 @@ from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import Request
 from bench_service.api.recordings import RecordingView
 from bench_service.evidence.imports import Synthesis
+from bench_service.routing import Routes
 from procedures.core import units
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Channel, Quantity
 
-router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
+router = Routes(prefix="/api/v1/recordings", tags=["recordings"])
 Coefficient = Annotated[float, Field(ge=0.0, le=1e6, allow_inf_nan=False)]
 
 KINDS = {
@@ -37,7 +38,7 @@ class SyntheticRequest(Request):
     seed: int = Field(1, ge=0, le=2**63 - 1)
 
     def synthesis(self) -> Synthesis:
-        """Convert the coefficients to SI units."""
+        """Return the request with its coefficients converted to SI units. Raises `BadParameter`."""
         quantity, unit = KINDS[self.kind]
         sizes = {name: size for name, (_, size) in units.NOISE_DISPLAY[unit].items()}
         noise = NoiseCoefficients(**{name: getattr(self, name) * size for name, size in sizes.items()})

@@ -2,14 +2,15 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 
 from bench_service.api.campaigns.schemas import TrendView
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
 from bench_service.api.http.fields import NAME
+from bench_service.routing import Routes
 
-router = APIRouter(prefix="/api/v1/units", tags=["campaigns"])
+router = Routes(prefix="/api/v1/units", tags=["campaigns"])
 
 
 @router.get("/{serial}/trend", responses=problems(404))

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from math import inf, sqrt
 from typing import Any
 
+from bench_service.bench.pace import PaceLog
 from procedures.analysis.measured_stations import angle_difference_deg
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.description import TableAccuracy
@@ -26,7 +27,7 @@ LEAST_S = 1.0
 AXES = ("outer", "middle", "inner")
 ROOM = ("temperature_c", "humidity_percent", "pressure_hpa")
 LEAST_TOLERANCE_DEG = 0.01
-"""Difference from the demand that is no fault of any table [deg]."""
+"""Smallest tolerance that any table gets [deg]."""
 SIGMAS = 10.0
 """Number of standard uncertainties of a commanded angle beyond which an encoder disagrees with the demand: by chance
 no table does so, and a wrong axis, a lost turn or a table that was turned by hand all do.
@@ -61,8 +62,11 @@ class DeviceLog:
     Refuses an axis that is not where it was commanded.
     """
 
-    def __init__(self, bench: Bench, station: Station) -> None:
-        """Set up. Angles are read of a table that stands still and carries the unit: not where a hand sets it."""
+    def __init__(self, bench: Bench, station: Station, start_s: float) -> None:
+        """Set up; `start_s`: bench time of the recording's beginning [s].
+
+        Angles are read of a table that stands still and carries the unit: not where a hand sets it.
+        """
         moved = station.turn is not None or station.sinusoid is not None
         alone = not moved and station.profile is None and station.current_ma is None
         self._commanded = station.angles if alone else None
@@ -73,6 +77,13 @@ class DeviceLog:
         self._limiting = False
         self._room = {name: _Moments(1) for name in ROOM}
         self._status: dict[str, None] = {}
+        wired = any(device.name == "unit_link" and device.address for device in bench.description.devices)
+        self._pace = PaceLog(start_s) if wired else None
+
+    def block(self, samples_s: float) -> None:
+        """A block of the unit has come; `samples_s`: time of all samples so far [s]."""
+        if self._pace is not None:
+            self._pace.block(self._bench.clock.now_s(), samples_s)
 
     async def look(self) -> None:
         """Read the devices if the last reading is old enough.
@@ -94,7 +105,9 @@ class DeviceLog:
         self._note(self._bench.imu.status())
 
     def measured(self) -> Measured:
-        """Means and spreads of the readings so far."""
+        """Return means and spreads of the readings so far: encoders, supply, room and status words; None for each
+        device of which no reading was taken.
+        """
         angles = supply = None
         if self._angles.count:
             mean, spread = TableAngles(*self._angles.mean), TableAngles(*self._angles.spread)
@@ -104,7 +117,8 @@ class DeviceLog:
             supply = MeasuredSupply(voltage, current, self._power.spread[1], self._limiting, self._power.count)
         means = {name: m.mean[0] for name, m in self._room.items() if m.count}
         room = MeasuredEnvironment(**means) if means else None
-        return Measured(angles, supply, room, tuple(self._status))
+        pace = None if self._pace is None else self._pace.measured()
+        return Measured(angles, supply, room, tuple(self._status), pace)
 
     def _table(self, commanded: TableAngles, reading: TableReading) -> None:
         require_agreement(commanded, reading, self._bench.description.accuracy)
@@ -123,7 +137,9 @@ class DeviceLog:
 
 
 def made_by(description: BenchDescription) -> dict[str, Any]:
-    """Source of a recording: real, mixed or simulated, and device by device; empty where all are simulated."""
+    """Return the origin of a recording and of each device by its name, as the JSON that is stored with the recording;
+    empty where all devices are simulated.
+    """
     if not description.devices:
         return {}
     return {
@@ -136,7 +152,7 @@ def made_by(description: BenchDescription) -> dict[str, Any]:
 
 
 def tolerance_deg(accuracy: TableAccuracy) -> float:
-    """Largest difference of an encoder from its demand that is no fault [deg]."""
+    """Largest allowed |encoder - demand| of any axis [deg]: the greater of 0.01 deg and ten pointing uncertainties."""
     return max(LEAST_TOLERANCE_DEG, SIGMAS * accuracy.pointing_sd_arcsec / 3600.0)
 
 

@@ -1,4 +1,4 @@
-"""PORT to a bench's devices without a job: their last known state, and the way to make them safe.
+"""Interface of a bench's devices without a job: their last known state, and the way to make them safe.
 
 Light on purpose: the supervisor imports this and little else.
 """
@@ -46,14 +46,16 @@ class DeviceState:
 
     @property
     def unsafe(self) -> tuple[str, ...]:
-        """The conditions that keep the unattended bench from being safe; empty: the bench is safe."""
+        """The conditions that keep the unattended bench from being safe, one sentence each; empty: the bench is
+        safe.
+        """
         found: list[str] = []
         if self.table != AT_REST:
             found.append("the table moves")
         if self.powered:
             found.append("the unit is on")
         if self.chamber_target_c not in (None, self.chamber_ambient_c):
-            found.append(f"the chamber is led to {self.chamber_target_c:g} °C")
+            found.append(f"the chamber is commanded to {self.chamber_target_c:g} °C")
         if self.current_ma != 0.0:
             found.append(f"the current source gives {self.current_ma:g} mA")
         if self.fault:
@@ -62,7 +64,9 @@ class DeviceState:
 
     @property
     def safe(self) -> bool:
-        """Table at rest, unit off, chamber led to ambient, no current, and no fault in the way."""
+        """True where the table is at rest, the unit off, the chamber commanded to ambient, no current flows, and no
+        fault is reported.
+        """
         return not self.unsafe
 
 
@@ -75,7 +79,9 @@ def commanded(state: DeviceState | None, worker: ProcessIdentity | None) -> bool
 
 
 class BenchDevices(Protocol):
-    """The devices of one bench, usable without a job."""
+    """The devices of one bench, usable without a job: their state and making them safe. Interface; `drivers` implements
+    it.
+    """
 
     def device_state(self) -> DeviceState | None:
         """The devices' last reported state; None where unknown on this host. Never waits for the driving process."""

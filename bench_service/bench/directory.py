@@ -1,6 +1,6 @@
 """The known benches: the one that this process drives, and all that workers have registered."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.registry import BenchRegistry
@@ -11,7 +11,9 @@ from procedures.core.unit import Unit
 
 
 class BenchDirectory:
-    """Everything that any process of the database can know of a bench by its name."""
+    """The benches by their names: the bench that this process drives, from its driver, and all others from the registry
+    in the database.
+    """
 
     def __init__(
         self,
@@ -35,11 +37,13 @@ class BenchDirectory:
         self._holder = holder
 
     def ids(self) -> tuple[str, ...]:
-        """Ids of all registered benches."""
+        """Ids of all registered benches, in the registry's order. Raises `StorageFailure`."""
         return tuple(bench.id for bench in self._registry.benches())
 
     def description(self, bench_id: str) -> BenchDescription:
-        """Return a bench's description. Raises `NotFound`, naming the registered benches."""
+        """Return a bench's description, of the own bench from its driver, of others from the database. Raises
+        `NotFound`, naming the registered benches.
+        """
         if self._driver is not None and self._driver.description.id == bench_id:
             return self._driver.description
         try:
@@ -49,7 +53,9 @@ class BenchDirectory:
             raise NotFound("bench", bench_id, f"there is {there}" if there else "no bench is registered") from None
 
     def default(self) -> str:
-        """The bench of a job that names none: this process's, or the only one. Raises `NotFound`."""
+        """Return the id of the bench for a job that names none: this process's, or the only registered one. Raises
+        `NotFound` where there is no such bench.
+        """
         if self._driver is not None:
             return self._driver.description.id
         ids = self.ids()
@@ -75,10 +81,19 @@ class BenchDirectory:
         drawn = self._drawn(serial) if serial is not None and description.simulated else None
         return tuple(units) if drawn is None else (*units, drawn)
 
+    def testable(self, serials: Iterable[str]) -> frozenset[str]:
+        """Select the units that some bench can test: those that it has, and those that a simulated one draws."""
+        wanted, found = frozenset(serials), set[str]()
+        for bench_id in self.ids():
+            found |= {unit.serial for unit in self.mounted(bench_id)}
+            if self.description(bench_id).simulated:
+                found |= {serial for serial in wanted - found if self._drawn(serial) is not None}
+        return wanted & found
+
     def driven(self, bench_id: str) -> bool:
-        """Return whether a worker drives the bench now, that is, if some process holds its lease."""
+        """Return whether a worker drives the bench now, that is, whether some process holds its lease."""
         return self.holder(bench_id) is not None
 
     def holder(self, bench_id: str) -> str | None:
-        """The holder of a bench's lease now, as text; None where the lease is free."""
+        """Return who holds a bench's lease now (role, process id), as text for people; None where the lease is free."""
         return self._holder(bench_id)

@@ -1,4 +1,4 @@
-"""PORT to the machine: opens the devices of a bench by the bench's name."""
+"""Interface of a bench's driver, which opens the devices of a bench for a job, and of the lease on a bench."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -19,14 +19,18 @@ class TrueTriad:
 
 
 class Lease(Protocol):
-    """The right to drive a bench, held for a process's life unless it is lost."""
+    """The right to drive a bench, held by one process until it ends or loses the lease. Interface;
+    `persistence/bench/lease.py` has it on SQLite and Postgres.
+    """
 
     def held(self) -> bool:
-        """Return whether this process still holds the lease."""
+        """Return whether this process still holds the lease. Asks the file system or the database."""
         ...
 
     def regain(self) -> bool:
-        """Take a lost lease again; False where another process has it, or the database does not answer."""
+        """Try to take a lost lease again; return False where another process has it, or the database does not
+        answer.
+        """
         ...
 
     def release(self) -> None:
@@ -35,13 +39,17 @@ class Lease(Protocol):
 
 
 class BenchDriver(BenchDevices, Protocol):
-    """The devices of one bench. `open` is called once per job, and again after a restart."""
+    """The devices of one bench as a job needs them: `open` is called once per job, and again after a restart.
+    Interface; `drivers` implements it for simulated and real devices.
+    """
 
     @property
     def description(self) -> BenchDescription: ...
 
     def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
-        """The units that this bench can test, as declared; a simulated bench mounts some by their serial."""
+        """Return the units that this bench can test, as declared; a simulated bench makes one for a `serial` that is
+        asked for.
+        """
         ...
 
     def open(
@@ -58,6 +66,10 @@ class BenchDriver(BenchDevices, Protocol):
         """
         ...
 
+    def warm_up(self) -> None:
+        """Load, while no job runs, what a device of the first job would otherwise load during a demand."""
+        ...
+
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
-        """The true values of a simulated unit in a job with this seed; empty on a real bench."""
+        """Return the true values of a simulated unit in a job with this seed, one a triad; empty on a real bench."""
         ...

@@ -18,7 +18,9 @@ SILENT_S = 10.0
 
 
 class HeartbeatFile:
-    """The heartbeat of one bench on its host: written by the driving process, read by the supervisor."""
+    """The heartbeat file of one bench on its host: a counter that the driving process raises every 0.5 s, and that the
+    supervisor reads.
+    """
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self._path = folder / f"bench-{bench_id}.heartbeat"
@@ -27,7 +29,9 @@ class HeartbeatFile:
         self._count = 0
 
     def prepare(self) -> None:
-        """Make the file with its full length. Raises `OSError` where there is no room."""
+        """Make the file with its full length, so that later writes need no free disk. Raises `OSError` where there is
+        no room.
+        """
         self._path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
@@ -36,7 +40,9 @@ class HeartbeatFile:
             os.close(file)
 
     def beat(self) -> None:
-        """Write the next heartbeat of this process. Raises `OSError`."""
+        """Write the next heartbeat of this process into the file: its process id, its start time, a count. Raises
+        `OSError`.
+        """
         self._count += 1
         record = encoded({"pid": self._own.pid, "started": self._own.started, "count": self._count})
         assert record is not None, "three short fields"
@@ -45,7 +51,9 @@ class HeartbeatFile:
         write_record(self._file, 0, record)
 
     def last(self, process: ProcessIdentity) -> int:
-        """The number of a process's last heartbeat; 0 where it has written none. Raises nothing."""
+        """Return the number of a process's last heartbeat; 0 where it has written none or the file cannot be read.
+        Raises nothing.
+        """
         with suppress(OSError, Unreadable):
             file = os.open(self._path, os.O_RDONLY | os.O_CLOEXEC)
             try:

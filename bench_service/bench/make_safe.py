@@ -21,7 +21,9 @@ class DrivingSession(Protocol):
     """The part of a job's session that is needed here (`bench_service.bench.session.BenchSession`)."""
 
     def make_safe(self) -> None:
-        """Make the devices safe. Raises an `ExceptionGroup`, and `Disconnected` where a device does not answer."""
+        """Make the devices safe, and wait until they are. Raises an `ExceptionGroup`, and `Disconnected` where a device
+        does not answer.
+        """
         ...
 
     def close(self) -> None:
@@ -31,7 +33,9 @@ class DrivingSession(Protocol):
 
 @dataclass(frozen=True)
 class Obstacle:
-    """The reasons why a bench could not be made safe."""
+    """Reasons for which a bench could not be made safe: one sentence a failure; `busy`: another process has the
+    devices' link.
+    """
 
     reasons: tuple[str, ...]
     busy: bool = False
@@ -39,16 +43,23 @@ class Obstacle:
 
     @property
     def why(self) -> str:
-        """All reasons in one line."""
+        """All reasons in one line, joined by semicolons."""
         return "; ".join(self.reasons)
 
+    @property
+    def reason(self) -> str:
+        """The reason of a stop, whose subject is the bench."""
+        return f"could not be made safe: {self.why}"
+
     def __str__(self) -> str:
-        return self.why if self.busy else f"could not be made safe: {self.why}"
+        return self.why if self.busy else self.reason
 
 
 @dataclass(frozen=True)
 class RoadEnd:
-    """The outcome of making a bench safe after a job's session."""
+    """Outcome of making a bench safe after a job's session: the obstacle that remains, and the failure of the session's
+    own link.
+    """
 
     obstacle: Obstacle | None = None
     """The failure that remains; None: the bench is safe."""
@@ -57,18 +68,43 @@ class RoadEnd:
 
 
 def over_new_link(devices: BenchDevices, by: str) -> Obstacle | None:
-    """Make devices safe that no job of this process has; None where they are safe then. Safe devices get no
-    command.
+    """Open a link to devices that no job of this process has, and make them safe; return what hindered it, None where
+    they are safe. Safe devices get no command.
     """
     try:
-        devices.make_safe(by)
+        state = devices.make_safe(by)
     except DeviceBusy as busy:
         return Obstacle((str(busy),), busy=True)
     except BenchError as error:
         return Obstacle((str(error),))
     except ExceptionGroup as group:
         return Obstacle(tuple(map(str, group.exceptions)))
-    return None
+    except OSError as error:  # another user's file, or no descriptor left
+        return Obstacle((f"the devices' register cannot be used: {error}",))
+    return None if state.safe else Obstacle(state.unsafe)
+
+
+def has_register(devices: BenchDevices) -> bool:
+    """Return whether devices have a register on this host; True also where it cannot be read now."""
+    try:
+        return devices.device_state() is not None
+    except OSError:  # no descriptor left, for one: a stop must not end here
+        return True
+
+
+def still_unsafe(devices: BenchDevices, by: str, of: str) -> str | None:
+    """The reason to stop a bench whose devices do not read as safe at the end `of` something, by their register.
+
+    To be called once every device has reported that it is safe and nothing else can reach them; None: they are safe, or
+    have no register. They are made safe over a new link then; the bench is stopped all the same, as nobody knows the
+    cause.
+    """
+    state = devices.device_state()
+    if state is None or state.safe:
+        return None
+    obstacle = over_new_link(devices, by)
+    then = "it was made safe afterwards, over a new link" if obstacle is None else f"it {obstacle}"
+    return f"was not safe at the end of {of}: {' and '.join(state.unsafe)}; {then}"
 
 
 @dataclass(frozen=True)
@@ -103,7 +139,9 @@ def over_the_jobs_link(session: DrivingSession) -> tuple[tuple[str, ...], bool]:
 
 
 def whole_road(session: DrivingSession, devices: BenchDevices, by: str, given_back: Callable[[], None]) -> RoadEnd:
-    """Make the bench of a job's session safe, and end the session. `given_back` is called once its link is."""
+    """Make the bench of a job's session safe, over the session's link and else over a new one, and end the session;
+    return how it went. `given_back` is called once the session's link is closed.
+    """
     failed: tuple[str, ...] = ()
     new_link_may_help = True
     try:

@@ -1,4 +1,4 @@
-"""Mountings of units on benches: their PORT of memory, and entering one.
+"""Mountings of units on benches: interface of their store, and entering one.
 
 A job rests on the mounting of its unit that stands on its bench. A plate holds one unit, and a unit is on one plate: a
 new mounting ends the ones before it of the same unit and of the same plate.
@@ -21,7 +21,9 @@ AHEAD = timedelta(minutes=1)
 
 
 class MountingStore(Protocol):
-    """The stored mountings. Every method is one transaction."""
+    """Store of mountings, standing and ended. Every method is one transaction. Interface; the SQL is in
+    `persistence`.
+    """
 
     def add(self, mounting: StoredMounting, idempotency: Idempotency | None = None) -> StoredMounting:
         """Store a mounting; the ones before it of its unit and of its plate end.
@@ -35,7 +37,7 @@ class MountingStore(Protocol):
         ...
 
     def standing(self, unit: str, bench: str) -> StoredMounting | None:
-        """The mounting of a unit that stands on a bench."""
+        """Return the mounting of a unit that stands on a bench; None where the unit is not mounted there."""
         ...
 
     def list(
@@ -47,7 +49,9 @@ class MountingStore(Protocol):
         after: str | None = None,
         limit: int = 50,
     ) -> Page[StoredMounting]:
-        """Mountings of a unit or on a bench, newest first; `standing`: only those that stand."""
+        """Return one page of the mountings of a unit or on a bench, newest first; `standing`: only those that have not
+        ended.
+        """
         ...
 
     def end(self, mounting_id: str, at: datetime, by: str) -> StoredMounting:
@@ -57,7 +61,7 @@ class MountingStore(Protocol):
 
 @dataclass(frozen=True)
 class MountingEntry:
-    """A mounting as a person enters it."""
+    """A mounting as a person enters it: unit, bench, plate, and the azimuth that was read, with its uncertainty."""
 
     unit: str
     bench: str
@@ -73,7 +77,9 @@ class MountingEntry:
 
 
 def new_mounting(entry: MountingEntry) -> StoredMounting:
-    """The mounting of an entry. Raises `BadParameter` for one that lies ahead, or before 1970."""
+    """Make a mounting, with a new id, from a person's entry. Raises `BadParameter` for a time in the future, or before
+    1970.
+    """
     at = now()
     if entry.mounted_at is not None and not EARLIEST <= entry.mounted_at <= at + AHEAD:
         raise BadParameter("mounted_at", entry.mounted_at.isoformat(), f"from 1970 to now, {at.isoformat()}")

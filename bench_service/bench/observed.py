@@ -28,7 +28,7 @@ from procedures.core.turn import Turn
 
 
 class Observer(Protocol):
-    """Receives the begin and end of verbs, named "device.verb", with their arguments as JSON."""
+    """Receives the begin and end of every verb of a device, as "device.verb". Interface: device register, watchdog."""
 
     def begin(self, verb: str, arguments: Mapping[str, Any]) -> None:
         """Called before the device is asked; where this raises, the verb ends with that failure instead."""
@@ -267,7 +267,7 @@ class ObservedImu(_Seen):
 
 
 class ObservedBench(Bench):
-    """A bench seen by an observer; everything else is the bench's own."""
+    """A bench whose devices report each verb to an observer; everything else is the wrapped bench's own."""
 
     def __init__(self, bench: Bench, observer: Observer) -> None:
         super().__init__(

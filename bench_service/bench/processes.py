@@ -23,7 +23,7 @@ class ProcessIdentity:
 
     @classmethod
     def own(cls) -> "ProcessIdentity":
-        """The identity of the calling process."""
+        """Return the identity of the calling process."""
         return cls(HOST, os.getpid(), _started(os.getpid()))
 
     @property
@@ -63,12 +63,14 @@ class Driving:
 
 
 def living(driving: Driving | None) -> ProcessIdentity | None:
-    """The process that drives a bench from this host, if it is alive."""
+    """Return the process that drives a bench from this host, if it is alive; otherwise None."""
     return driving.process if driving is not None and driving.alive else None
 
 
 class Watch(Protocol):
-    """The processes of one host that drive or supervise a bench, as they register themselves."""
+    """The processes of one host that drive or supervise a bench, as they register themselves in the bench's lock files.
+    Interface.
+    """
 
     def driving(self) -> Driving | None:
         """The process that drives the bench; None where no process of this host ever did."""

@@ -1,4 +1,6 @@
-"""Requests to the person at the bench while a job runs, and the answers: PORT of memory, and the operator behind it."""
+"""Requests to the person at the bench while a job runs, and the answers: interface of their store, and the operator who
+asks through it.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,25 +38,26 @@ class Prompt:
 
 
 class PromptStore(Protocol):
-    """One open request per job. Request and answer are events of the job too."""
+    """Store of the open request of each job, at most one. Request and answer become events of the job too. Interface;
+    the SQL is in `persistence`.
+    """
 
     def ask(self, job_id: str, prompt: Prompt) -> None:
-        """Store a request to a person; it replaces an earlier request of the job."""
+        """Store a request to a person and append it to the job's events; it replaces an earlier request of the job."""
         ...
 
     def answer(self, job_id: str, prompt_id: str, answer: Answer, at: datetime) -> Job:
-        """Store the answer to a request.
-
-        Raises `IllegalTransition` where no request is open or another one than the answer names, `NotFound`.
+        """Store the answer to a request and return the job. Raises `IllegalTransition` where no request is open or
+        another one than the answer names, `NotFound` for an unknown job.
         """
         ...
 
     def answered(self, job_id: str) -> Answer | None:
-        """The answer to the open request; None: not yet answered."""
+        """Return the answer to the open request; None where it is not yet answered."""
         ...
 
     def withdraw(self, job_id: str) -> None:
-        """Remove the job's open request."""
+        """Remove the job's open request, as after its answer or when the job ends."""
         ...
 
 

@@ -25,7 +25,9 @@ class Unreadable(Exception):
 
 
 def encoded(document: Mapping[str, Any]) -> bytes | None:
-    """Encode a record: CRC-32, then the document as JSON, padded; None where the document is too long for one."""
+    """Return the bytes of a record: CRC-32, then the document as JSON, padded; None where the document is too long for
+    one.
+    """
     text = json.dumps(document, ensure_ascii=False)
     body = text.encode(errors="backslashreplace")  # a lone surrogate becomes its JSON escape
     if len(body) > RECORD_BYTES - 16:
@@ -34,7 +36,9 @@ def encoded(document: Mapping[str, Any]) -> bytes | None:
 
 
 def decoded(record: bytes) -> dict[str, Any] | None:
-    """The document in a record; None in an empty one. Raises `Unreadable`."""
+    """Return the document in the bytes of a record; None in an empty one. Raises `Unreadable` where the checksum does
+    not match.
+    """
     if not record.strip(b"\0"):
         return None
     checksum, _, body = record.partition(b" ")
@@ -45,7 +49,9 @@ def decoded(record: bytes) -> dict[str, Any] | None:
 
 
 def read_record(file: int, number: int = 0) -> dict[str, Any] | None:
-    """The document at a place of an open file; None where nothing was written. Raises `Unreadable`, `OSError`."""
+    """Read the document of record `number` of an open file; None where nothing was written. Raises `Unreadable`,
+    `OSError`.
+    """
     for _ in range(TRIES):
         try:
             return decoded(os.pread(file, RECORD_BYTES, number * RECORD_BYTES))
@@ -55,7 +61,7 @@ def read_record(file: int, number: int = 0) -> dict[str, Any] | None:
 
 
 def write_record(file: int, number: int, record: bytes) -> None:
-    """Write an encoded record over what was at its place. Raises `OSError`."""
+    """Write an encoded record over record `number` of an open file. Raises `OSError`."""
     os.pwrite(file, record, number * RECORD_BYTES)
 
 

@@ -1,4 +1,4 @@
-"""PORT of memory: registered benches, the units that each can test, and their software stops.
+"""Interface of the registry of benches: their descriptions, the units that each can test, and their software stops.
 
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
@@ -12,18 +12,20 @@ from procedures.bench import BenchDescription
 
 
 class BenchRegistry(Protocol):
-    """Benches that workers have registered, and their stops. A bench works only while none of its stops stands."""
+    """Registry of the benches that workers have registered, and of their stops. A bench works only while none of its
+    stops stands. Interface; the SQL is in `persistence`.
+    """
 
     def put_bench(self, bench: BenchDescription, mounted: Sequence[str] = ()) -> None:
-        """Register a bench with the serials of the units that it can test."""
+        """Register a bench, or replace its description, with the serials of the units that it can test."""
         ...
 
     def mounted(self, bench_id: str) -> tuple[str, ...]:
-        """The serials of the units that a bench can test. Raises `NotFound`."""
+        """Return the serials of the units that a bench can test. Raises `NotFound` for an unknown bench."""
         ...
 
     def bench(self, bench_id: str) -> BenchDescription:
-        """Return the description of a bench. Raises `NotFound`."""
+        """Return the description of a bench. Raises `NotFound` for an unknown bench."""
         ...
 
     def benches(self) -> tuple[BenchDescription, ...]: ...
@@ -36,11 +38,13 @@ class BenchRegistry(Protocol):
         ...
 
     def stop_bench_once(self, stop: BenchStop) -> None:
-        """Note a stop by the service itself, unless one for the same reason stands: a retry adds none."""
+        """Store a stop by the service itself, unless one for the same reason stands: a retry adds none."""
         ...
 
     def confirm_safe(self, bench_id: str, at: datetime, by: str) -> None:
-        """Note that a stopped bench was seen safe, in every stop that stands and has no such note yet."""
+        """Store when and by which process a stopped bench was seen safe, in every standing stop that has no such note
+        yet.
+        """
         ...
 
     def release_stop(self, bench_id: str, stop_id: str, at: datetime, by: str, remark: str) -> BenchStop:
@@ -52,17 +56,17 @@ class BenchRegistry(Protocol):
         ...
 
     def standing_stops(self, bench_id: str) -> tuple[BenchStop, ...]:
-        """The stops that keep a bench from working, oldest first; empty where it may work."""
+        """Return the stops that keep a bench from working, oldest first; empty where it may work."""
         ...
 
     def stored_stops(self, ids: Iterable[str]) -> tuple[BenchStop, ...]:
-        """Those of some stops that are stored, standing or released. None is ever deleted."""
+        """Return, of the stops with these ids, those that are stored, standing or released. No stop is ever deleted."""
         ...
 
     def bench_stop(self, bench_id: str) -> BenchStop | None:
-        """The oldest stop that stands; None where the bench may work."""
+        """Return the oldest stop of a bench that stands; None where the bench may work."""
         ...
 
     def stops(self, bench_id: str, *, after: str | None = None, limit: int = 50) -> Page[BenchStop]:
-        """Stops of a bench, newest first: those that stand and those that were released."""
+        """Return one page of a bench's stops, newest first, standing and released."""
         ...

@@ -25,7 +25,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Safety:
-    """The known safety of a bench at one moment."""
+    """The known safety of a bench at one moment: safe or not (None: not known here), why, the devices' state, and the
+    living worker and supervisor.
+    """
 
     safe: bool | None
     """True or False where known; None: not known on this host, and not reported by the bench's own host."""
@@ -61,7 +63,9 @@ class SafetyService:
         self._by = f"the service, {ProcessIdentity.own()}"
 
     def known(self, bench_id: str) -> Safety:
-        """The bench's safety as known now. Raises `StorageFailure`."""
+        """Return the bench's safety as it is known now, from the device register of this host, or from the database for
+        a bench of another host. Raises `StorageFailure`.
+        """
         state = self._devices(bench_id).device_state()
         watch = self._watch(bench_id)
         worker, supervisor = living(watch.driving()), watch.supervisor()
@@ -147,7 +151,9 @@ class SafetyService:
         return obstacle is None
 
     def stop_unsafe(self, bench_id: str, why: str) -> None:
-        """Stop a bench that could not be made safe: nothing may run on it until a person releases it."""
+        """Store a stop of a bench that could not be made safe: nothing may run on it until a person releases the
+        stop.
+        """
         log.error("bench %s: %s", bench_id, why)
         self._benches.stop_bench_once(BenchStop(bench_id, now(), why, by=self._by))
 

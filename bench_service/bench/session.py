@@ -84,11 +84,13 @@ class BenchSession(DrivenBench):
             )
         )
         tap, begins_s = self._tap, stream.start_s
-        devices = DeviceLog(self._bench, station)
+        devices, samples = DeviceLog(self._bench, station, stream.start_s), 0
         if tap is not None:
             tap.stream(stream)
         try:
             async for block in stream.blocks:
+                samples += len(block)
+                devices.block(samples / stream.rate_hz)
                 writer.write(block)
                 await devices.look()
                 if tap is not None:

@@ -1,4 +1,4 @@
-"""Stores of the bench room: the registry of benches, their live state, mountings of units, and prompts to people."""
+"""Stores that `bench` needs: the registry of benches, their live state, mountings of units, and prompts to people."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from bench_service.evidence.stores import EvidenceStores
 
 @dataclass(frozen=True)
 class BenchStores(EvidenceStores):
-    """The stores of this room and of those below it."""
+    """The stores that `bench` needs, with those of `evidence` and the packages below it, as one value."""
 
     benches: BenchRegistry
     live: LiveStore

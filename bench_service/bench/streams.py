@@ -8,7 +8,9 @@ from procedures.core.recording import Station
 
 
 async def stream_of(streams: AsyncIterator[Stream], procedure: str, station: Station) -> Stream:
-    """The next stream, which must be of this station. Raises `ProcedureDefect`, and any error of the procedure."""
+    """Return the procedure's next stream, which must be of this station; waits for it. Raises `ProcedureDefect` for
+    another one or none, and any error of the procedure.
+    """
     stream = await anext(streams, None)
     if stream is None:
         raise ProcedureDefect(

@@ -1,4 +1,6 @@
-"""PORTS of the supervisor: the bench's lease, its stops in the database, and the listener for other hosts' stops."""
+"""Interfaces that the supervisor needs: the bench's lease, its stops in the database, and the listener for other hosts'
+stops.
+"""
 
 from typing import Protocol
 
@@ -7,34 +9,36 @@ from bench_service.bench.stop.messages import Listening
 
 
 class Lease(Protocol):
-    """The exclusive right to drive a bench."""
+    """The exclusive right to drive a bench, as the supervisor takes it to make the bench safe. Interface."""
 
     def release(self) -> None: ...
 
 
 class Listener(Protocol):
-    """A listener that takes stops from other hosts."""
+    """A server that takes stops from other hosts. Interface; see `StopListener`."""
 
     def listening(self) -> Listening | None:
-        """The address at which it listens now."""
+        """Return the address at which it listens now; None where it does not."""
         ...
 
 
 class SafetyBooks(StopBooks, Protocol):
-    """The supervisor's records in the database. Every verb raises `ServiceError` if it does not answer."""
+    """Records of the supervisor in the database: stops, confirmations, notes. Interface; every verb raises
+    `ServiceError` if the database does not answer.
+    """
 
     def confirm_safe(self, by: str) -> None:
-        """Record that a stopped bench is safe."""
+        """Store in each standing stop that the bench was seen safe, by this process."""
         ...
 
     def say_listening(self, at: Listening) -> None:
-        """Record the address where this supervisor takes stops from other hosts."""
+        """Store the address where this supervisor takes stops from other hosts."""
         ...
 
     def stop(self, reason: str, by: str) -> None:
-        """Stop the bench until a person releases it."""
+        """Store a stop of the bench, which stands until a person releases it."""
         ...
 
     def note(self, by: str, text: str, job: str | None) -> None:
-        """Record an action of the supervisor: in the audit trail, and at the job that it concerns."""
+        """Write an action of the supervisor into the audit trail, and into the events of the job that it concerns."""
         ...

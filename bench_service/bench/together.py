@@ -13,13 +13,14 @@ UNWIND_S = 0.5
 
 
 class SafeDevice(Protocol):
-    """A device that can be made safe."""
+    """A device that can be made safe. Interface of the drivers of a wired bench."""
 
     async def make_safe(self) -> None: ...
 
 
 async def make_safe_together(devices: Mapping[str, SafeDevice], deadlines_s: Mapping[str, float]) -> None:
-    """Make every device safe. Raises an `ExceptionGroup` of the failures, after all have ended or are late.
+    """Make every device safe at the same time, and wait until each is safe or its deadline [s] is over. Raises an
+    `ExceptionGroup` of the failures, after all have ended or are late.
 
     A late one is cancelled; a driver that does not leave even then is left alone after `UNWIND_S`, so that it holds up
     neither the others nor the way to safety over a new link.

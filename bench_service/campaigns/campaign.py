@@ -26,13 +26,13 @@ Name = Annotated[str, Field(pattern=NAME)]
 
 
 class Document(BaseModel):
-    """Base of a campaign's parts: unknown fields are refused, NaN and infinity too."""
+    """Base of the parts of a campaign's document: unknown fields are refused, NaN and infinity too."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class StepLimit(Document):
-    """A requirement on one quantity of a step's result, added to the procedure's own checks; inclusive."""
+    """An allowed range of one quantity of a step's result, ends included, added to the procedure's own checks."""
 
     quantity: str = QUANTITY
     unit: str = Field(min_length=1, max_length=32, pattern=TEXT, description="of the limits; deg/h, m/s^2, ppm, 1, …")
@@ -65,7 +65,9 @@ class StepLimit(Document):
 
 
 class TrendRule(Document):
-    """Hold a quantity to the control limits of the unit's earlier results of the same procedure and parameters."""
+    """Rule that holds a quantity to the control limits of the unit's earlier results of the same procedure and
+    parameters.
+    """
 
     quantity: str = QUANTITY
     outcome: Literal["warning", "fail"] = Field("warning", description="what a signal of the chart means")
@@ -100,7 +102,7 @@ class DecisionRule(Document):
 
 
 class Step(Document):
-    """One step: a procedure on the bench, or a method over what earlier steps gave."""
+    """One step of a campaign: a procedure on the bench, or a method over the results of earlier steps."""
 
     name: Name
     procedure: Label | None = None
@@ -120,7 +122,7 @@ class Step(Document):
 
     @property
     def does(self) -> str:
-        """Name of its procedure or method."""
+        """Name of the step's procedure or method."""
         return self.procedure or self.method or ""
 
     @model_validator(mode="after")
@@ -154,7 +156,7 @@ class Seeds(Document):
 
 
 class Campaign(Document):
-    """Steps in order, and when to stop before the last of them."""
+    """A campaign as data: its steps in order, their limits, and the rules for stopping before the last of them."""
 
     name: Name
     title: str = Field("", max_length=200, pattern=TEXT)
@@ -188,7 +190,7 @@ class Campaign(Document):
         return self
 
     def step(self, name: str) -> Step:
-        """A step by name."""
+        """Return the step of that name. Raises `StopIteration` where the campaign has none."""
         return next(step for step in self.steps if step.name == name)
 
 

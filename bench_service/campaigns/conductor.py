@@ -50,13 +50,15 @@ log = logging.getLogger(__name__)
 
 
 class Submit(Protocol):
-    """Submits a job to the queue; repeated with its key it gives the same job."""
+    """Function that submits a job to the queue; repeated with its key it returns the same job."""
 
     def __call__(self, request: JobRequest, key: str, *, team: str) -> Job: ...
 
 
 class Conductor:
-    """Advances every open run, and starts due schedules, in a thread of its own from `begin` to `stop`."""
+    """Thread that advances every open campaign run and starts due schedules, from `begin` to `stop`. Keeps no state:
+    all is in the database.
+    """
 
     def __init__(
         self,
@@ -77,12 +79,12 @@ class Conductor:
         self._methods = BackgroundTasks(self.nudge)
 
     def begin(self) -> None:
-        """Begin to advance runs."""
+        """Start the thread that advances runs."""
         self._thread = Thread(target=self._work, name="conductor", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End the conductor's thread; runs stay as they are."""
+        """End the conductor's thread and wait for it, within a limit; runs stay as they are."""
         self._ending.set()
         self._wanted.set()
         if self._thread is not None:
@@ -90,11 +92,11 @@ class Conductor:
             self._methods.wait(METHODS_LEAVE_S)
 
     def nudge(self) -> None:
-        """Look at once, after a new request."""
+        """Have the thread look at once, after a new request."""
         self._wanted.set()
 
     def look(self) -> bool:
-        """Fire due schedules and advance every open run as far as possible; True where one is still open."""
+        """Start due schedules and advance every open run as far as possible; return True where a run is still open."""
         self._fire_schedules()
         runs = self._stores.campaigns.open_runs()
         for run in runs:
@@ -107,7 +109,7 @@ class Conductor:
         return bool(runs)
 
     def advance(self, run_id: str) -> None:
-        """Advance one run until it waits for something, or has ended."""
+        """Advance one run, step by step, until it waits for a job or a turn, or has ended; each change is stored."""
         campaigns = self._stores.campaigns
         while not self._ending.is_set():
             run = campaigns.run(run_id)
@@ -287,7 +289,7 @@ class Conductor:
 
 
 def key_of(run: CampaignRun, index: int) -> str:
-    """The idempotency key of a step's present attempt."""
+    """Return the idempotency key of the present attempt of a run's step."""
     return f"campaign:{run.id}:{index}:{run.steps[index].attempt}"
 
 

@@ -12,8 +12,7 @@ from procedures.parameters import DecisionRules
 
 
 def decided(check: Check, rule: DecisionRule) -> Check:
-    """The check under the rule of a campaign or of one of its limits (`rule_of`), with the decision in its note.
-
+    """Return the check under the rule of a campaign or of one of its limits (`rule_of`), with the decision in its note.
     A value that is not finite stays a fail.
     """
     made = limits.decided(check, Rule(rule.rule, rule.guard, coverage_factor=rule.coverage_factor))
@@ -22,12 +21,12 @@ def decided(check: Check, rule: DecisionRule) -> Check:
 
 
 def rule_of(limit: StepLimit, rule: DecisionRule) -> DecisionRule:
-    """The rule of one limit of a campaign: its own, else the campaign's."""
+    """Return the decision rule of one limit of a campaign: its own, else the campaign's."""
     return rule if limit.rule is None else rule.model_copy(update={"rule": limit.rule})
 
 
 def rule_of_check(rules: DecisionRules | None, check: str) -> DecisionRule:
-    """The rule of a procedure's own check, as its parameters have it; simple acceptance without."""
+    """Return the decision rule of a procedure's own check, as its parameters have it; simple acceptance without."""
     if rules is None:
         return DecisionRule.model_validate({})
     of = rules.of(check)
@@ -36,7 +35,7 @@ def rule_of_check(rules: DecisionRules | None, check: str) -> DecisionRule:
 
 
 def in_words(rule: DecisionRule) -> str:
-    """The rule as a sentence for a report."""
+    """Return the decision rule as a sentence for a report."""
     stated = (
         ""
         if rule.false_alarm is None

@@ -30,7 +30,7 @@ from procedures.procedure import PredictedUncertainty
 
 @dataclass(frozen=True)
 class StepPlan:
-    """The plan of one step."""
+    """The plan of one step of a campaign: stations, duration, size of its data, warnings, gates and limits."""
 
     name: str
     does: str
@@ -48,7 +48,7 @@ class StepPlan:
 
 @dataclass(frozen=True)
 class Examination:
-    """The plan of a campaign on a unit; `warnings` name the step that they are of."""
+    """The plan of a campaign on a unit, step by step; each warning names its step."""
 
     steps: tuple[StepPlan, ...]
     duration_s: float
@@ -83,7 +83,7 @@ _EXPECTED = "predicted with the calibration that earlier steps are to give, at n
 
 
 class Examiner:
-    """Examines campaigns in advance; moves and stores nothing."""
+    """Plans campaigns on a unit and a bench in advance, and finds their faults; moves and stores nothing."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
@@ -158,7 +158,7 @@ class Examiner:
         if method.calibrations is not NO_CALIBRATIONS:
             progress.calibrating.add(step.name)
         params, record = method.params.model_validate(step.parameters), self._planner.context(unit, bench).unit
-        checks = method.planned_checks(params, record, progress.plans_of(step.calibrations_of))
+        checks = method.planned_checks(params, record, progress.predicted_uncertainties_of(step.calibrations_of))
         limits = tuple(_previews(checks, params))
         coarse = (
             f"{one.check}: the limit of {one.maximum:g} {one.unit} cannot be resolved, U = "
@@ -245,7 +245,7 @@ def _of_campaign(limit: StepLimit, predicted: Sequence[PredictedUncertainty]) ->
 
 
 def step_field(campaign: Campaign, name: str) -> int:
-    """Index of a step by name. Raises `NotFound`."""
+    """Return the index (from 0) of the step of that name. Raises `NotFound`, naming the campaign's steps."""
     for index, step in enumerate(campaign.steps):
         if step.name == name:
             return index

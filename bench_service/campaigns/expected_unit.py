@@ -1,4 +1,6 @@
-"""The unit as a campaign's earlier steps will leave it: for previews of steps that need their results."""
+"""A unit as earlier steps of a campaign will leave it, with planned calibrations, for previews of steps that need
+them.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -34,14 +36,18 @@ class Progress:
     planned: dict[str, tuple[PredictedUncertainty, ...]] = field(
         default_factory=dict[str, tuple[PredictedUncertainty, ...]]
     )
-    """Predicted coefficients of the steps that calibrate, by step."""
+    """Predicted uncertainties of the coefficients of each step that calibrates, by the name of the step."""
 
-    def plans_of(self, steps: Sequence[str]) -> tuple[tuple[PredictedUncertainty, ...], ...]:
-        """Predicted coefficients of some steps, in order; steps without a prediction are left out."""
+    def predicted_uncertainties_of(self, steps: Sequence[str]) -> tuple[tuple[PredictedUncertainty, ...], ...]:
+        """Predicted uncertainties of the coefficients, one tuple per named step that has a prediction, in the order of
+        `steps`; the others are left out.
+        """
         return tuple(self.planned[name] for name in steps if self.planned.get(name))
 
     def expected(self, unit: Unit) -> Unit | None:
-        """The unit with the calibrations that are planned in place of those that it lacks; None where it lacks more."""
+        """Return the unit with planned calibrations in place of those that it lacks; None where it lacks more than are
+        planned.
+        """
         made: Mapping[str, TriadCalibration] = {}
         for uncertainties in self.planned.values():
             made = {**made, **_nominal(uncertainties)}

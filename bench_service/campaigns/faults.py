@@ -30,14 +30,16 @@ def valid_parameters(validate: Any, parameters: dict[str, Any], where: str) -> N
 
 
 def first_fault(error: ValidationError, where: str) -> BadParameter:
-    """The first fault of a step's parameters, with the step in its path."""
+    """Return the first fault of a step's parameters as an error to raise, with the step in its path."""
     first = error.errors(include_url=False)[0]
     path = ".".join(str(part) for part in (where, "parameters", *first["loc"]))
     return BadParameter(path, first.get("input"), first["msg"])
 
 
 def require_known(step: Step, where: str, names: tuple[str, ...] | None) -> None:
-    """Refuse a limit or trend on a quantity that the result can never have, where its quantities are known."""
+    """Refuse a limit or trend on a quantity that the result can never have, where its quantities are known. Raises
+    `BadParameter`.
+    """
     if names is None:
         return
     for kind, wanted in (("limits", step.limits), ("trends", step.trends)):
@@ -48,7 +50,9 @@ def require_known(step: Step, where: str, names: tuple[str, ...] | None) -> None
 
 
 def require_possible(step: Step, where: str) -> None:
-    """Refuse a step that contradicts itself: nothing could pass, or nothing would ever be judged."""
+    """Refuse a step that contradicts itself: nothing could pass, or nothing would ever be judged. Raises
+    `BadParameter`.
+    """
     for position, limit in enumerate(step.limits):
         for earlier in step.limits[:position]:
             if earlier.excludes(limit) or limit.excludes(earlier):
@@ -65,7 +69,7 @@ def require_possible(step: Step, where: str) -> None:
 
 
 def require_calibrations(step: Step, where: str, calibrating: Collection[str]) -> None:
-    """Refuse a method on calibrations of a step that gives none."""
+    """Refuse a method that takes calibrations of a step which gives none. Raises `BadParameter`."""
     for position, name in enumerate(step.calibrations_of):
         if name not in calibrating:
             allowed = f"a step that calibrates: {', '.join(sorted(calibrating)) or 'none before this one does'}"
@@ -73,7 +77,9 @@ def require_calibrations(step: Step, where: str, calibrating: Collection[str]) -
 
 
 def unresolved(limit: StepLimit, where: str, predicted: tuple[PredictedUncertainty, ...]) -> list[str]:
-    """Warn of a limit narrower than the predicted uncertainty of its quantity; refuse a unit of another kind."""
+    """Return a warning for a limit narrower than the predicted uncertainty of its quantity, else nothing. Raises
+    `BadParameter` where limit and quantity have units of different kinds.
+    """
     found = next((p for p in predicted if p.about(limit.quantity)), None)
     if found is None:
         return []

@@ -22,7 +22,7 @@ CHECKS = TypeAdapter(tuple[Check, ...])
 
 @dataclass(frozen=True)
 class Judgement:
-    """A step's verdict, and the checks, warnings and reason behind it."""
+    """Verdict of a step, and the checks, warnings and reason behind it."""
 
     verdict: Verdict
     checks: tuple[Check, ...]
@@ -31,7 +31,7 @@ class Judgement:
 
 
 def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) -> Judgement:
-    """The result's own verdict, made worse where the campaign's requirements are not met.
+    """Return the result's own verdict, made worse where the campaign's limits or trend rules are not met.
 
     A limit on a quantity that the result lacks, or has in another kind of unit, is an error of the step.
     """
@@ -59,7 +59,7 @@ def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) 
 
 
 def checks_of(document: dict[str, Any]) -> tuple[Check, ...]:
-    """The procedure's own checks in a result's document."""
+    """Return the procedure's own checks from the document of a result; empty where it has none."""
     return CHECKS.validate_python(document.get("checks", []))
 
 

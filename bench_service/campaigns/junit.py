@@ -26,7 +26,9 @@ DECLARATION = b"<?xml version='1.0' encoding='utf-8'?>\n"
 
 
 def document(run: CampaignRun) -> bytes:
-    """Write a run as UTF-8, with its declaration. Open steps of an open run are errors: they have no verdict yet."""
+    """Return a run as JUnit XML, UTF-8 with its declaration. Open steps of an open run are errors: they have no verdict
+    yet.
+    """
     from junitparser import JUnitXml
 
     whole = JUnitXml(_text(f"{run.campaign.name} {run.unit}"))

@@ -13,7 +13,9 @@ from procedures.core.limits import Verdict
 
 @dataclass(frozen=True)
 class StepLineage:
-    """The lineage of one attempt of a step."""
+    """Lineage of one attempt of a step: job, result, recordings with hashes, calibrations, parameters, code version,
+    seed.
+    """
 
     step: str
     does: str
@@ -34,19 +36,21 @@ class StepLineage:
 
 
 def recordings_of(run: CampaignRun, step: Step, stores: Stores) -> tuple[str, ...]:
-    """Ids of the recordings that a method's step takes from the jobs of earlier steps, in the order of the steps."""
+    """Return the ids of the recordings that a method's step takes from the jobs of earlier steps, in the order of the
+    steps.
+    """
     jobs = [s.job_id for name in step.recordings_of for s in run.steps if s.name == name and s.job_id]
     return tuple(r.info.id for job_id in jobs for r in stores.recordings.of_job(job_id))
 
 
 def calibrations_of(run: CampaignRun, step: Step, stores: Stores) -> tuple[str, ...]:
-    """Ids of the calibrations that the results of earlier steps gave, in the order of the steps."""
+    """Return the ids of the calibrations that the results of earlier steps gave, in the order of the steps."""
     results = [s.result_id for name in step.calibrations_of for s in run.steps if s.name == name and s.result_id]
     return tuple(c.id for c in stores.calibrations.of_results(results))
 
 
 def lineage_of(run: CampaignRun, stores: Stores) -> tuple[StepLineage, ...]:
-    """The lineage of every attempt of every step, in order; steps that never began have none."""
+    """Return the lineage of every attempt of every step, in order; steps that never began have none."""
     found: list[StepLineage] = []
     for step in run.steps:
         for job_id in (*step.earlier_jobs, *((step.job_id,) if step.job_id else ())):
@@ -59,7 +63,9 @@ def lineage_of(run: CampaignRun, stores: Stores) -> tuple[StepLineage, ...]:
 
 
 def failed_calibrations(run: CampaignRun, index: int, stores: Stores) -> str:
-    """The calibrations of earlier steps that failed and so do not count, as a sentence; empty where there is none."""
+    """Return a sentence about the calibrations of earlier steps that failed and so do not count; empty where there is
+    none.
+    """
     failed = {s.result_id: s.name for s in run.steps[:index] if s.verdict is not Verdict.PASS and s.result_id}
     gave = stores.calibrations.of_results(list(failed))
     names = dict.fromkeys(failed[c.result_id] for c in gave if c.result_id)

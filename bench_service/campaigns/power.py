@@ -1,4 +1,6 @@
-"""Foresight of a limit: does the plan resolve it, does the unit as recorded meet it, is twice the limit found out?"""
+"""Forecast of a limit from a plan: does the plan resolve it, does the unit as recorded meet it, would twice the limit
+be found?
+"""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -44,7 +46,9 @@ class LimitPreview:
 
 
 def preview(planned: PlannedCheck, rule: DecisionRule) -> LimitPreview:
-    """Foresee a planned check; `rule` gives the coverage factor, and the guard band of a campaign's limit."""
+    """Return the forecast of a planned check; `rule` gives the coverage factor, and the guard band of a campaign's
+    limit.
+    """
     limit, u, k = planned.limit, planned.standard_uncertainty, rule.coverage_factor
     width = half_width(limit)
     guard = rule.guard * k * u if rule.rule == "guarded" and u is not None else 0.0

@@ -27,7 +27,7 @@ ENDED = frozenset({StepState.SUCCEEDED, StepState.FAILED, StepState.CANCELLED, S
 
 @dataclass(frozen=True)
 class RunRequest:
-    """A client's request for a campaign run."""
+    """A client's request for a campaign run: campaign, unit, bench, seed, labels, parameters of steps."""
 
     campaign: str
     unit: str
@@ -41,7 +41,7 @@ class RunRequest:
 
 @dataclass(frozen=True)
 class StepRun:
-    """The progress of one step of a run."""
+    """Progress of one step of a run: state, attempt, job, result, verdict, checks, times."""
 
     name: str
     does: str
@@ -68,7 +68,9 @@ class StepRun:
 
 @dataclass(frozen=True)
 class CampaignRun:
-    """The progress of one execution, with the campaign as it was at the time of the request."""
+    """One execution of a campaign on a unit: its progress, with the campaign as it was at the time of the request. A
+    value; `transitions` makes the next one.
+    """
 
     id: str
     campaign: Campaign
@@ -106,22 +108,24 @@ class CampaignRun:
 
     @property
     def deadline_at(self) -> datetime | None:
-        """Time when its window closes; None before it began."""
+        """Time when the campaign's window closes; None without a window, and before the run began."""
         window = self.campaign.window_h
         return None if window is None or self.started_at is None else self.started_at + timedelta(hours=window)
 
     @property
     def current(self) -> int | None:
-        """Index of the first step that has not ended; None where all have."""
+        """Index (from 0) of the first step that has not ended; None where all have."""
         return next((i for i, step in enumerate(self.steps) if step.state not in ENDED), None)
 
     def step_of(self, index: int) -> Step:
-        """The campaign's definition of a step."""
+        """Return the campaign's definition of the step with this index."""
         return self.campaign.steps[index]
 
 
 def verdict_of(run: CampaignRun) -> Verdict:
-    """The run's verdict: error where a step gave none or nothing was judged, fail where one failed, else pass."""
+    """Return the run's verdict: error where a step gave none or nothing was judged, fail where one failed, else
+    pass.
+    """
     verdicts = [step.verdict for step in run.steps if step.state is not StepState.SKIPPED]
     if not verdicts or any(v is None or v is Verdict.ERROR for v in verdicts):
         return Verdict.ERROR

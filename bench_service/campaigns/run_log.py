@@ -8,7 +8,7 @@ log = logging.getLogger(__name__)
 
 
 def tell(before: CampaignRun, after: CampaignRun) -> None:
-    """Write a line for each change; a failure is a warning."""
+    """Write a log line for each change from one state of a run to the next; a failure is a warning."""
     for old, new in zip(before.steps, after.steps, strict=True):
         _tell_step(old, new)
     if after.waiting and after.waiting != before.waiting:

@@ -23,7 +23,7 @@ AHEAD = timedelta(hours=1)
 
 
 class Missed(StrEnum):
-    """The rule for a start that was missed because no service was running."""
+    """Rule for a start that was missed because no service was running: run it late, or leave it out."""
 
     RUN_ONCE = "run_once"
     """One run makes up for all missed starts."""
@@ -41,7 +41,9 @@ class Overlap(StrEnum):
 
 @dataclass(frozen=True)
 class Schedule:
-    """A campaign that is run on a unit repeatedly."""
+    """A campaign that is run on a unit repeatedly, by a cron expression in a time zone, with its next and last
+    start; or once, at the next start alone.
+    """
 
     id: str
     cron: str
@@ -56,6 +58,8 @@ class Schedule:
     start_within_s: float = 300.0
     """Delay beyond which a start counts as missed [s]."""
     overlap: Overlap = Overlap.SKIP
+    once: bool = False
+    """Whether the next start is the only one: after it the schedule is switched off."""
     labels: dict[str, str] = field(default_factory=dict[str, str])
     team: str = ""
     """Team whose members change it, and act on its runs; empty: every engineer, and every operator on the runs."""
@@ -77,7 +81,9 @@ def zone_of(name: str) -> ZoneInfo:
 
 
 def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[datetime]:
-    """Every start after a moment, in UTC. Raises `BadParameter` for an invalid expression or zone."""
+    """Yield every start after a moment, in UTC, without end. Raises `BadParameter` for an invalid expression or
+    zone.
+    """
     from cronsim import CronSim, CronSimError
 
     zone = zone_of(time_zone)
@@ -127,7 +133,9 @@ def _rising(moments: Iterator[datetime | None], after: datetime) -> Iterator[dat
 
 
 def next_start(cron: str, time_zone: str, moment: datetime) -> datetime:
-    """The first start after a moment, in UTC. Raises `BadParameter` for an expression not due within 50 years."""
+    """Return the first start after a moment, in UTC. Raises `BadParameter` for an expression not due within 50
+    years.
+    """
     start = next(starts_after(cron, time_zone, moment), None)
     if start is None:
         raise BadParameter("cron", cron, "an expression that is due within 50 years")
@@ -135,7 +143,7 @@ def next_start(cron: str, time_zone: str, moment: datetime) -> datetime:
 
 
 def latest_due(schedule: Schedule, at: datetime) -> datetime:
-    """The latest start up to `at` of a schedule that is due, that is, whose next start is not after `at`."""
+    """Return the latest start up to `at` of a schedule that is due, that is, whose next start is not after `at`."""
     assert schedule.next_at is not None
     latest = schedule.next_at
     for begin in (max(schedule.next_at, at - LOOK_BACK), schedule.next_at):

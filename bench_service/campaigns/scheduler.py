@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ScheduleRequest:
-    """A client's request for a schedule."""
+    """A client's request for a schedule: cron expression, time zone, campaign, unit, bench, rules for missed starts."""
 
     cron: str
     time_zone: str
@@ -42,12 +42,15 @@ class ScheduleRequest:
     missed: Missed = Missed.RUN_ONCE
     start_within_s: float = 300.0
     overlap: Overlap = Overlap.SKIP
+    once: bool = False
     enabled: bool = True
     labels: dict[str, str] = field(default_factory=dict[str, str])
 
 
 class Scheduler:
-    """Schedules of one service; `prepared` makes a run of a request, examined but not stored."""
+    """Operations of clients on schedules, and the start of due ones, which the conductor calls. `prepared` makes a run
+    of a request, examined but not stored.
+    """
 
     def __init__(
         self,
@@ -61,10 +64,10 @@ class Scheduler:
         self._looked_s = -inf
 
     def add(self, request: ScheduleRequest, key: str | None = None, team: str = "") -> Schedule:
-        """Add a campaign's schedule; its runs belong to `team`.
+        """Store a campaign's schedule and return it; its runs belong to `team`. Raises `BadParameter` for a time that
+        never comes, and its run's refusals.
 
-        Raises `BadParameter` for a time that never comes, and its run's refusals. A key of a schedule that was removed
-        since is used up: `IdempotencyConflict`.
+        A key of a schedule that was removed since is used up: `IdempotencyConflict`.
         """
         idempotency = Idempotency.of("schedules", key, request)
         known = self._stores.keys.made(idempotency, "schedule")
@@ -93,7 +96,9 @@ class Scheduler:
             ) from error
 
     def enable(self, schedule_id: str, enabled: bool) -> Schedule:
-        """Switch a schedule on or off; starts that passed while it was off are not made up. Raises `NotFound`."""
+        """Switch a schedule on or off and return it; starts that passed while it was off are not made up. Raises
+        `NotFound`.
+        """
         campaigns = self._stores.campaigns
         while True:
             schedule = campaigns.schedule(schedule_id)
@@ -109,7 +114,7 @@ class Scheduler:
         return self._stores.campaigns.schedule(schedule_id)
 
     def list(self, after: str | None = None, limit: int = 50) -> Page[Schedule]:
-        """List schedules, newest first."""
+        """Return one page of schedules, newest first."""
         return self._stores.campaigns.schedules(after, limit)
 
     def remove(self, schedule_id: str) -> None:
@@ -117,7 +122,7 @@ class Scheduler:
         self._stores.campaigns.remove_schedule(schedule_id)
 
     def fire_due(self) -> None:
-        """Start all due schedules. One that cannot be read does not keep the others from starting."""
+        """Start a run for each due schedule. One that cannot be read does not keep the others from starting."""
         at = now()
         self._after_a_clock_that_was_ahead(at)
         for schedule in self._stores.campaigns.due_schedules(at):
@@ -146,12 +151,15 @@ class Scheduler:
             self._stores.campaigns.save_schedule(changed, schedule.next_at, None)
 
     def fire(self, schedule: Schedule, at: datetime) -> bool:
-        """Apply a due schedule's rules; False where another process was faster. Raises `StorageFailure`."""
+        """Apply a due schedule's rules: start a run, or record why not. Return False where another process was faster.
+        Raises `StorageFailure`.
+        """
         planned = latest_due(schedule, at)
         run, outcome = self._started(schedule, planned, at)
         changed = replace(
             schedule,
-            next_at=next_start(schedule.cron, schedule.time_zone, at),
+            enabled=not schedule.once,
+            next_at=None if schedule.once else next_start(schedule.cron, schedule.time_zone, at),
             last_at=planned,
             last_run=schedule.last_run if run is None else run.id,
             last_outcome=outcome,

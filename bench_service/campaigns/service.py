@@ -28,7 +28,7 @@ SEEDS = SystemRandom()
 
 
 class CampaignService:
-    """Campaigns, their runs, schedules and trends of one service."""
+    """Operations of clients on campaigns, their runs, schedules and trends."""
 
     def __init__(
         self,
@@ -49,11 +49,11 @@ class CampaignService:
         return Examiner(self._planner)
 
     def campaign(self, name: str) -> Campaign:
-        """Return a stored or a shipped campaign. Raises `NotFound`."""
+        """Return a stored or a shipped campaign by its name. Raises `NotFound`."""
         return shipped()[name] if name in shipped() else self._stores.campaigns.get(name)
 
     def campaigns(self, after: str | None = None, limit: int = 50) -> Page[Campaign]:
-        """List stored and shipped campaigns by name."""
+        """Return one page of stored and shipped campaigns, in order of their names."""
         found = {c.name: c for c in self._stores.campaigns.list(after, limit + 1)}
         found |= {name: c for name, c in shipped().items() if after is None or name > after}
         names = sorted(found)
@@ -61,7 +61,7 @@ class CampaignService:
         return Page(shown, shown[-1].name if len(names) > limit else None)
 
     def add(self, campaign: Campaign, key: str | None = None, team: str = "") -> Campaign:
-        """Store a campaign of a team once it was examined. Raises `NameTaken`, and the errors of `examine`."""
+        """Examine a campaign, store it for a team, and return it. Raises `NameTaken`, and the errors of `examine`."""
         idempotency = Idempotency.of("campaigns", key, campaign.model_dump())
         if self._stores.keys.made(idempotency, "campaign") is not None:
             return self._stores.campaigns.get(campaign.name)
@@ -72,11 +72,13 @@ class CampaignService:
         return self._stores.campaigns.add(campaign, now(), idempotency, team)
 
     def team_of(self, name: str) -> str:
-        """The team whose members change a campaign; empty: every engineer. Raises `NotFound`."""
+        """Return the team whose members change a campaign; empty: every engineer. Raises `NotFound`."""
         return "" if name in shipped() else self._stores.campaigns.team_of(name)
 
     def replace(self, campaign: Campaign) -> Campaign:
-        """Change a stored campaign; runs that have begun keep theirs. Raises `NotFound`, `NameTaken`."""
+        """Examine and replace a stored campaign, and return it; runs that have begun keep theirs. Raises `NotFound`,
+        `NameTaken` for a shipped one.
+        """
         if campaign.name in shipped():
             raise NameTaken(f"campaign {campaign.name!r} comes with the service and cannot be changed")
         self._stores.campaigns.get(campaign.name)
@@ -86,7 +88,9 @@ class CampaignService:
         return campaign
 
     def examine(self, campaign: Campaign, unit: str | None = None, bench: str | None = None) -> Examination:
-        """Examine a campaign on a unit, or on the first that is mounted on some bench; see `Examiner.examine`."""
+        """Return the plan of a campaign on a unit, or on the first that is mounted on some bench; see
+        `Examiner.examine`.
+        """
         if unit is not None:
             return self._examiner.examine(campaign, unit, bench, strict=True)
         at = self._planner.benches.one() if bench is None else bench
@@ -94,7 +98,9 @@ class CampaignService:
         return self._examiner.examine(campaign, first, at, strict=False)
 
     def start(self, request: RunRequest, key: str | None = None, team: str = "") -> CampaignRun:
-        """Queue a campaign run of a team. Raises `NotFound`, `NotMounted`, `BadParameter`, `IdempotencyConflict`."""
+        """Store a campaign run of a team, which the conductor begins, and return it. Raises `NotFound`, `NotMounted`,
+        `BadParameter`, `IdempotencyConflict`.
+        """
         idempotency = Idempotency.of("campaign_runs", key, request)
         known = self._stores.keys.made(idempotency, "campaign_run")
         if known is not None:
@@ -104,7 +110,9 @@ class CampaignService:
         return stored
 
     def prepared(self, request: RunRequest) -> CampaignRun:
-        """A new run, not stored yet: the campaign with the request's parameters, examined on its unit and bench."""
+        """Return a new run, not stored yet: the campaign with the request's parameters, examined on its unit and bench.
+        Raises `BadParameter`, `NotFound`, `NotMounted`.
+        """
         campaign = overridden(self.campaign(request.campaign), request.parameters)
         try:
             examination = self.examine(campaign, request.unit, request.bench)
@@ -135,7 +143,7 @@ class CampaignService:
         )
 
     def cancel_run(self, run_id: str) -> CampaignRun:
-        """End a run: its job as soon as the bench is safe; steps that did not begin are skipped.
+        """End a run, and return it: its job ends as soon as the bench is safe; steps that did not begin are skipped.
 
         Raises `NotFound`, `IllegalTransition` where it has ended.
         """
@@ -152,9 +160,8 @@ class CampaignService:
     def trend(
         self, unit: str, procedure: str, name: str, simulated: bool | None, last: int, same_parameters: bool = False
     ) -> Trend:
-        """The trend of a quantity over a unit's results by a procedure, if wanted of the newest one's parameters alone.
-
-        Raises `NotFound`.
+        """Return the trend of a quantity over a unit's results by a procedure, on request only of those with the newest
+        result's parameters. Raises `NotFound`.
         """
         self._stores.units.unit(unit)
         self._planner.catalogue.procedure(procedure)
@@ -170,7 +177,7 @@ class CampaignService:
 
 
 def overridden(campaign: Campaign, parameters: Mapping[str, Mapping[str, Any]]) -> Campaign:
-    """The campaign with other parameters for some steps. Raises `BadParameter` for an unknown step."""
+    """Return the campaign with other parameters for some steps. Raises `BadParameter` for an unknown step."""
     steps = list(campaign.steps)
     for name, changed in parameters.items():
         try:

@@ -11,6 +11,6 @@ FOLDER = Path(__file__).parent
 
 @cache
 def shipped() -> Mapping[str, Campaign]:
-    """The shipped campaigns by name."""
+    """Return the campaigns that come with the service, by name."""
     found = (Campaign.model_validate_json(file.read_bytes()) for file in sorted(FOLDER.glob("*.json")))
     return {campaign.name: campaign for campaign in found}

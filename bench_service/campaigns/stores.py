@@ -1,5 +1,5 @@
-"""PORT of memory for campaigns, their runs and schedules; as in `bench_service.jobs.stores` each method is one
-transaction.
+"""Interface of the store of campaigns, their runs and schedules; each method is one transaction, as in
+`bench_service.jobs.stores`.
 """
 
 from dataclasses import dataclass
@@ -15,14 +15,16 @@ from bench_service.model.records import Idempotency, Page
 
 
 class CampaignStore(Protocol):
-    """The stored campaigns, runs and schedules."""
+    """Store of campaigns, their runs and schedules. Interface; the SQL is in `persistence`."""
 
     def add(self, campaign: Campaign, at: datetime, idempotency: Idempotency | None = None, team: str = "") -> Campaign:
-        """Store a new campaign, for the members of a team to change. Raises `NameTaken`, `IdempotencyConflict`."""
+        """Store a new campaign, which the members of a team may change, and return it. Raises `NameTaken`,
+        `IdempotencyConflict`.
+        """
         ...
 
     def replace(self, campaign: Campaign, at: datetime) -> None:
-        """Change a stored campaign; runs keep the version that they began with. Raises `NotFound`."""
+        """Replace a stored campaign; runs keep the version that they began with. Raises `NotFound`."""
         ...
 
     def get(self, name: str) -> Campaign:
@@ -30,23 +32,25 @@ class CampaignStore(Protocol):
         ...
 
     def team_of(self, name: str) -> str:
-        """The team whose members change a campaign; empty: every engineer. Raises `NotFound`."""
+        """Return the team whose members change a campaign; empty: every engineer. Raises `NotFound`."""
         ...
 
     def list(self, after: str | None = None, limit: int = 50) -> tuple[Campaign, ...]:
-        """List campaigns by name, beginning after a given name."""
+        """Return at most `limit` stored campaigns in order of their names, beginning after a given name."""
         ...
 
     def add_run(self, run: CampaignRun, idempotency: Idempotency | None = None) -> CampaignRun:
-        """Store a new run; where the key is known, give the run that it made. Raises `IdempotencyConflict`."""
+        """Store a new run and return it; where the key is known, return the run that it made. Raises
+        `IdempotencyConflict`.
+        """
         ...
 
     def run(self, run_id: str) -> CampaignRun:
-        """Return one campaign run. Raises `NotFound`."""
+        """Return one campaign run by its id. Raises `NotFound`."""
         ...
 
     def save_run(self, run: CampaignRun, revision: int) -> bool:
-        """Replace a run, unless it was changed since that revision was read; True where it was replaced."""
+        """Replace a run, unless it was changed since that revision was read; return True where it was replaced."""
         ...
 
     def runs(
@@ -60,19 +64,21 @@ class CampaignStore(Protocol):
     ) -> Page[CampaignRun]: ...
 
     def counts(self) -> dict[tuple[str, str, str], int]:
-        """Number of runs by campaign, state and verdict ("" for no verdict)."""
+        """Return the number of runs by campaign, state and verdict ("" for no verdict)."""
         ...
 
     def open_runs(self) -> tuple[CampaignRun, ...]:
-        """Runs that have not ended, oldest first."""
+        """Return all runs that have not ended, oldest first."""
         ...
 
     def open_run_of(self, schedule_id: str) -> str | None:
-        """Id of the oldest open run that a schedule started."""
+        """Return the id of the oldest open run that a schedule started; None where there is none."""
         ...
 
     def add_schedule(self, schedule: Schedule, idempotency: Idempotency | None = None) -> Schedule:
-        """Add a campaign's schedule. Raises `IdempotencyConflict`."""
+        """Store a campaign's schedule and return it; where the key is known, the one that it made. Raises
+        `IdempotencyConflict`.
+        """
         ...
 
     def schedule(self, schedule_id: str) -> Schedule:
@@ -82,15 +88,15 @@ class CampaignStore(Protocol):
     def schedules(self, after: str | None = None, limit: int = 50) -> Page[Schedule]: ...
 
     def due_schedules(self, at: datetime) -> tuple[Schedule, ...]:
-        """Enabled schedules whose next start is not after `at`."""
+        """Return the enabled schedules whose next start is not after `at`."""
         ...
 
     def waiting_schedules(self, at: datetime) -> tuple[Schedule, ...]:
-        """Enabled schedules whose next start is after `at`."""
+        """Return the enabled schedules whose next start is after `at`."""
         ...
 
     def save_schedule(self, schedule: Schedule, expected_next_at: datetime | None, run: CampaignRun | None) -> bool:
-        """Replace a schedule and add the run that it starts, in one transaction.
+        """Replace a schedule and store the run that it starts, in one transaction; return True.
 
         False, and nothing changed, where its next start is not the expected one, or it is gone: another process was
         faster.
@@ -104,6 +110,6 @@ class CampaignStore(Protocol):
 
 @dataclass(frozen=True)
 class Stores(JobStores):
-    """All stores of one service."""
+    """All stores of one service as one value; `persistence/stores.py` builds it."""
 
     campaigns: CampaignStore

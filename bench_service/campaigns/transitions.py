@@ -17,7 +17,7 @@ RETRY_SEED = 1000
 
 
 def not_begun(run_id: str, request: RunRequest, campaign: Campaign, bench: str, why: str, at: datetime) -> CampaignRun:
-    """A run that could not begin, kept so that the missing night is seen: failed, with the reason."""
+    """Return a run that could not begin, kept so that the missing night is seen: failed, with the reason."""
     steps = tuple(StepRun(s.name, s.does, StepState.SKIPPED, reason="the run could not begin") for s in campaign.steps)
     return CampaignRun(
         id=run_id,
@@ -35,17 +35,19 @@ def not_begun(run_id: str, request: RunRequest, campaign: Campaign, bench: str, 
 
 
 def begun(run: CampaignRun, at: datetime) -> CampaignRun:
-    """The run once its turn has come: it is running."""
+    """Return the run in state running, with its start time."""
     return _next(run, state=JobState.RUNNING, started_at=at, waiting="")
 
 
 def waiting(run: CampaignRun, why: str) -> CampaignRun | None:
-    """The run with its reason for waiting; None where that is known already."""
+    """Return the run with its reason for waiting; None where it has this reason already."""
     return None if run.waiting == why else _next(run, waiting=why)
 
 
 def attempted(run: CampaignRun, index: int, at: datetime) -> CampaignRun:
-    """The run with its step's next attempt decided; the job is submitted next, under a key of this attempt alone."""
+    """Return the run with its step's next attempt decided; the job is submitted next, under a key of this attempt
+    alone.
+    """
     step = run.steps[index]
     attempt = step.attempt + 1
     seeded = run.seed is not None and run.step_of(index).procedure is not None
@@ -55,12 +57,12 @@ def attempted(run: CampaignRun, index: int, at: datetime) -> CampaignRun:
 
 
 def submitted(run: CampaignRun, index: int, job_id: str) -> CampaignRun:
-    """The run with its step's job submitted."""
+    """Return the run with the id of the job that was submitted for its step."""
     return _next(_with(run, index, replace(run.steps[index], job_id=job_id)), waiting="")
 
 
 def observed(run: CampaignRun, index: int, state: StepState, why: str) -> CampaignRun | None:
-    """The run with its step's job in a state; None where nothing has changed."""
+    """Return the run with its step in the state of the step's job; None where nothing has changed."""
     step = run.steps[index]
     of_run = JobState.PAUSED if state is StepState.PAUSED else JobState.RUNNING
     if (step.state, run.state, run.waiting) == (state, of_run, why):
@@ -69,7 +71,7 @@ def observed(run: CampaignRun, index: int, state: StepState, why: str) -> Campai
 
 
 def judged(run: CampaignRun, index: int, judgement: Judgement, result_id: str, at: datetime) -> CampaignRun:
-    """The run with a step judged; the stop rules decide if the next one begins."""
+    """Return the run with the judgement of a step; the stop rules decide whether the next step begins."""
     step = run.steps[index]
     state = StepState.FAILED if judgement.verdict is Verdict.ERROR else StepState.SUCCEEDED
     ended = replace(
@@ -88,7 +90,7 @@ def judged(run: CampaignRun, index: int, judgement: Judgement, result_id: str, a
 def failed(
     run: CampaignRun, index: int, state: StepState, reason: str, at: datetime, final: bool = False
 ) -> CampaignRun:
-    """The run after an attempt without a verdict: it is retried where that is allowed, unless it is `final`.
+    """Return the run after an attempt without a verdict: it is retried where that is allowed, unless it is `final`.
 
     Final are a refusal that would recur, and a person's decision. Without a retry the step has ended in error.
     """
@@ -108,25 +110,25 @@ def failed(
 
 
 def left_out(run: CampaignRun, index: int, reason: str, at: datetime) -> CampaignRun:
-    """The run with a step skipped, because an earlier step failed to give what it needs."""
+    """Return the run with a step skipped, because an earlier step failed to give what it needs."""
     step = replace(run.steps[index], state=StepState.SKIPPED, reason=reason, finished_at=at)
     return _after(_with(run, index, step), index, at)
 
 
 def cancelled(run: CampaignRun, at: datetime) -> CampaignRun:
-    """The run ended by a client's request; its steps that did not end are skipped."""
+    """Return the run ended by a client's request; its steps that did not end are skipped."""
     skipped = _skipped(run, "the run was cancelled")
     return _next(skipped, state=JobState.CANCELLED, finished_at=at, waiting="", reason="cancelled")
 
 
 def out_of_time(run: CampaignRun, at: datetime) -> CampaignRun:
-    """The run ended because its window has closed: unfinished steps are skipped, and the verdict is error."""
+    """Return the run ended because its window has closed: unfinished steps are skipped, and the verdict is error."""
     why = f"the window of {run.campaign.window_h:g} h has closed"
     return ended(_skipped(run, why), at, why)
 
 
 def ended(run: CampaignRun, at: datetime, reason: str = "") -> CampaignRun:
-    """The run with all steps ended, or stopped for a reason that alone makes it an error."""
+    """Return the ended run with its verdict; a `reason` for an early end makes it an error by itself."""
     verdict = Verdict.ERROR if reason else verdict_of(run)
     if verdict is Verdict.ERROR and not reason:
         without = [s.name for s in run.steps if s.verdict in (None, Verdict.ERROR) and s.state is not StepState.SKIPPED]

@@ -1,4 +1,4 @@
-"""The command line ``bench``: its commands by subject, and what becomes of their errors.
+"""The command line ``bench``: its commands by subject, and how their errors are reported.
 
 Each command prints its outcome to standard output, and errors to standard error. Tables and progress bars are imported
 by the commands that show them: a server that starts does not wait for them.

@@ -7,7 +7,7 @@ import typer
 
 
 class Shell(StrEnum):
-    """A shell for which completion can be had."""
+    """Shells for which a completion script can be printed."""
 
     BASH = "bash"
     ZSH = "zsh"
@@ -15,7 +15,7 @@ class Shell(StrEnum):
 
 
 def prepare() -> None:
-    """Have the answers ready that the scripts ask this program for."""
+    """Register the completion answers of all shells that the scripts ask this program for."""
     from typer._completion_classes import completion_init
 
     completion_init()
@@ -29,14 +29,14 @@ def completion(shell: Annotated[Shell, typer.Argument(help="Shell to write the c
 
 
 def procedure_names(incomplete: str) -> list[str]:
-    """Return the procedures whose names begin so; by their files, which is quick."""
+    """Return the names of procedures that begin with the typed text; by their files, which is quick."""
     from procedures import catalog
 
     return _names(catalog.__path__[0], incomplete)
 
 
 def method_names(incomplete: str) -> list[str]:
-    """Return the methods whose names begin so; by their files, which is quick."""
+    """Return the names of methods that begin with the typed text; by their files, which is quick."""
     from procedures import methods
 
     return _names(methods.__path__[0], incomplete)

@@ -16,7 +16,9 @@ PROCEDURES = ("calibration_12_orientations", "verification_9_orientations")
 
 
 def demonstrate(client: "httpx.Client", unit: str, seed: int, console: Console) -> int:
-    """Calibrate, verify after another power-up (the next seed), show; the exit code of the worse verdict."""
+    """Calibrate a unit, verify it after another power-up (the next seed), and print both; return the exit code of the
+    worse verdict.
+    """
     codes = [_one(client, procedure, unit, seed + k, console) for k, procedure in enumerate(PROCEDURES)]
     return max(codes)
 

@@ -11,7 +11,7 @@ from bench_service.cli.refusal import Refused
 
 
 def text_of(file: Path) -> str:
-    """Read all of a text file. Raises `Refused`."""
+    """Return the content of a text file. Raises `Refused` where it cannot be read or is not UTF-8."""
     try:
         return file.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -25,7 +25,7 @@ def check_folder(file: Path) -> None:
 
 
 def clear_place(file: Path) -> None:
-    """Remove a file that an earlier command left, so that it cannot pass for this one's. Raises `Refused`."""
+    """Remove a file that an earlier command left, so that it is not taken for this one's. Raises `Refused`."""
     check_folder(file)
     try:
         if file.exists() and not file.is_file():

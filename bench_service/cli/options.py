@@ -33,7 +33,9 @@ NO_ITEMS: list[str] = []
 
 
 def parameter(text: str) -> tuple[str, Any]:
-    """``name=value`` with the value as JSON, or as plain text where it is none."""
+    """Return name and value of ``name=value``, the value as JSON, or as plain text where it is none. Raises
+    `Refused`.
+    """
     name, separator, value = text.partition("=")
     if not separator or not name:
         raise Refused(f"--set {text}: expected name=value")
@@ -63,17 +65,17 @@ def announce(text: str) -> None:
 
 
 def wide() -> Console:
-    """A console for tables: wide enough for their columns where the terminal is narrow, or none."""
+    """Return a console for tables: wide enough for their columns where the terminal is narrow, or none."""
     return Console(width=max(console.width, 140), markup=False, emoji=False)
 
 
 def wide_errors() -> Console:
-    """A console on standard error for tables, as wide as they need."""
+    """Return a console on standard error for tables, as wide as they need."""
     return Console(stderr=True, width=max(errors.width, 160), markup=False, emoji=False)
 
 
 def labels(texts: list[str]) -> dict[str, str]:
-    """Convert ``name=text`` texts to labels. Raises `Refused`."""
+    """Return ``name=text`` texts as labels by name. Raises `Refused`."""
     pairs = [text.partition("=") for text in texts]
     for name, equals, value in pairs:
         if not (name and equals and value):
@@ -82,7 +84,9 @@ def labels(texts: list[str]) -> dict[str, str]:
 
 
 def key_or_new(key: str | None) -> str:
-    """Return the key of a create, a new one where none is given: so that there is a way back. Raises `Refused`."""
+    """Return the idempotency key of a create, a new one where none is given, so that the request can be repeated.
+    Raises `Refused`.
+    """
     if key is None:
         return new_id()
     if not (key.isascii() and key.isprintable() and key):
@@ -91,7 +95,7 @@ def key_or_new(key: str | None) -> str:
 
 
 def named(by: str | None) -> dict[str, str]:
-    """Build the header by which a person is known to the service. Raises `Refused`."""
+    """Return the header by which a person is known to the service. Raises `Refused`."""
     if by is None:
         return {}
     if not (by.isprintable() and by.strip()):

@@ -1,1 +1,3 @@
-"""Drivers that mount a bench: the simulated one now, real devices later. One file for each maker and device."""
+"""Drivers that make a bench: the simulated one, and real devices by a bench file. One file for each maker and
+device.
+"""

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 
 def driver_of(settings: Settings, asking: Asking) -> BenchDriver:
-    """The driver of the settings' bench: by its bench file, or simulated. Raises `Misconfigured`, `NotMounted`."""
+    """Return the driver of the settings' bench: by its bench file, or simulated. Raises `Misconfigured`,
+    `NotMounted`.
+    """
     from bench_service.drivers.device_faults import FaultPlan
     from bench_service.drivers.simulated import SimulatedDriver
 
@@ -77,7 +79,7 @@ def _kept(path: Path) -> "BenchFile":
 
 
 def own_devices(settings: Settings) -> BenchDevices:
-    """The devices of the settings' own bench. Raises `Misconfigured` for a bench file that cannot be used."""
+    """Return the devices of the settings' own bench. Raises `Misconfigured` for a bench file that cannot be used."""
     if settings.bench_file is not None:
         _require_id(_kept(settings.bench_file.absolute()).id, settings)
     return devices_of(settings.devices_in(), settings.bench_id, settings.bench_file)

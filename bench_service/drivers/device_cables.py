@@ -13,7 +13,9 @@ from procedures.bench.errors import Disconnected
 
 
 class DeviceCables:
-    """Cables of one bench's devices, which are named as in the devices' journal: "turntable", "imu", …"""
+    """Files that mark the links of one simulated bench's devices as lost; devices are named as in the journal:
+    "turntable", "imu", …
+    """
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self._folder = folder
@@ -26,7 +28,7 @@ class DeviceCables:
     def cut(self, device: str, why: str, lasts_s: float | None = None) -> None:
         """Lose a device's link, for `lasts_s` of real time or until its file is deleted.
 
-        One that is lost for good stays so, whatever else becomes of it.
+        One that is lost for good stays so, whatever else happens to it.
         """
         until = None if lasts_s is None else wall_clock.now() + timedelta(seconds=lasts_s)
         path = self.file(device)
@@ -38,7 +40,7 @@ class DeviceCables:
         partial.replace(path)
 
     def need(self, device: str) -> None:
-        """Check a device's cable. Raises `Disconnected` naming the device while its link is lost."""
+        """Check that a device's link is not lost. Raises `Disconnected` naming the device."""
         lost = self._lost(self.file(device))
         if lost is not None and (lost[0] is None or wall_clock.now() < lost[0]):
             why = f" ({lost[1]})" if lost[1] else ""

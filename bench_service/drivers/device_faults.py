@@ -18,7 +18,7 @@ HANG_S = 3600.0
 
 
 class FaultRule(BaseModel):
-    """A fault that may occur when a verb begins."""
+    """A fault that may occur when a verb begins: which verb, which kind, with which probability."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -40,7 +40,7 @@ class FaultRule(BaseModel):
 
 
 class FaultPlan(BaseModel):
-    """Faults of a bench's devices, and the seed of their random numbers."""
+    """Faults of a simulated bench's devices, and the seed of their random numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -49,7 +49,8 @@ class FaultPlan(BaseModel):
 
     @classmethod
     def parse(cls, text: str) -> "FaultPlan":
-        """From JSON such as ``{"seed": 7, "rules": [{"verb": "turntable.*", "kind": "hang", "probability": 0.1}]}``.
+        """Return the plan in a JSON text such as ``{"seed": 7, "rules": [{"verb": "turntable.*", "kind": "hang",
+        "probability": 0.1}]}``.
 
         Raises `Misconfigured` naming the field.
         """
@@ -64,7 +65,9 @@ class FaultPlan(BaseModel):
 
 
 class DeviceFaults:
-    """Draw the faults of one opening of the devices; each has its own random numbers, the same in each exercise."""
+    """Draws the faults of one opening of the devices; each opening has its own random numbers, the same in each
+    exercise.
+    """
 
     def __init__(self, plan: FaultPlan, opening: str, cables: DeviceCables) -> None:
         self._rules = plan.rules

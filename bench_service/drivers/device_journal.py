@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 class DeviceJournal:
-    """Journal of one bench; any process may append a line, whole lines never mix."""
+    """Journal of one bench's devices: a file to which any process appends lines; whole lines never mix."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -33,7 +33,9 @@ class DeviceJournal:
         """Bytes that end a line for which there was not room enough."""
 
     def write(self, verb: str, arguments: Mapping[str, Any], **more: Any) -> None:
-        """Append a line: time, process id, verb, arguments, and the fields of `more`."""
+        """Append a line of JSON: time, process id, verb, arguments, and the fields of `more`. Never raises: a full disk
+        costs the line.
+        """
         entry = {"at": wall_clock.now().isoformat(), "pid": os.getpid(), "verb": verb, "arguments": dict(arguments)}
         line = json.dumps({**entry, **more}, separators=(",", ":"), default=str).encode() + b"\n"
         try:
@@ -51,7 +53,7 @@ class DeviceJournal:
         self._size += len(line)
 
     def rotate(self) -> None:
-        """Rotate the journal when it is long enough; only the holder of the devices' link may call it."""
+        """Start a new file when the journal is long enough; only the holder of the devices' link may call it."""
         if self._size < ROTATE_BYTES:
             return
         self.close()
@@ -62,7 +64,7 @@ class DeviceJournal:
         self.path.replace(self._old(1))
 
     def entries(self) -> list[dict[str, Any]]:
-        """Read every line that is kept, oldest first; without those that a full disk cut."""
+        """Return every line that is kept, oldest first, as JSON objects; without those that a full disk cut."""
         found: list[dict[str, Any]] = []
         for file in [*(self._old(number) for number in range(KEPT, 0, -1)), self.path]:
             for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:

@@ -23,7 +23,7 @@ from procedures.bench.errors import DeviceBusy, Disconnected
 
 
 class DeviceRegister:
-    """State, journal and lost links of one bench's devices, in files of a folder on the bench's host."""
+    """Last known state, journal and lost links of one bench's devices, in files of a folder on the bench's host."""
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self.bench_id = bench_id
@@ -32,7 +32,7 @@ class DeviceRegister:
         self.cables = DeviceCables(folder, bench_id)
 
     def read(self) -> DeviceState | None:
-        """Read the devices' state without their link; None where no process of this host ever had it."""
+        """Return the devices' last noted state, without their link; None where no process of this host ever had it."""
         try:
             file = os.open(self.path, os.O_RDONLY | os.O_CLOEXEC)
         except FileNotFoundError:
@@ -43,7 +43,9 @@ class DeviceRegister:
             os.close(file)
 
     def open(self, by: str = "", job: str | None = None) -> "DeviceLink":
-        """Open the devices' link. Raises `DeviceBusy` naming its present holder."""
+        """Take the devices' link, which one process has at a time, and return it. Raises `DeviceBusy` naming its
+        present holder.
+        """
         self.path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
@@ -60,7 +62,7 @@ class DeviceRegister:
 
 
 class DeviceLink:
-    """Right to command a bench's devices, and the memory of the last commands. Closed, it commands nothing."""
+    """The right to command a bench's devices, and the memory of the last commands. Closed, it commands nothing."""
 
     def __init__(self, file: int, journal: DeviceJournal, by: str, job: str | None) -> None:
         self._file: int | None = file
@@ -76,7 +78,9 @@ class DeviceLink:
         return self._file is not None
 
     def note(self, verb: str, arguments: dict[str, Any], **changes: Any) -> None:
-        """Write a demand on the devices, and the state that it leads to. Raises `Disconnected` once it is closed."""
+        """Write a demand on the devices into the journal, and the state that it leads to into the register. Raises
+        `Disconnected` once it is closed.
+        """
         with self._mutex:
             if self._file is None:
                 raise Disconnected(f"{verb}: this process has closed its link to the devices")

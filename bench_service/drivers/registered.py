@@ -29,12 +29,14 @@ LOST = "as the bench's truth file has it"
 
 
 def simulated_safe_state(device: str, state: DeviceState) -> dict[str, Any]:
-    """Changes of the register once a simulated device was made safe."""
+    """Return the fields of the register that change once a simulated device was made safe."""
     return SAFE[device](state)
 
 
 class RegisterObserver:
-    """Turns verbs into the state that real devices would have, and stops verbs to devices whose link is lost."""
+    """Notes each verb in the register as the state that real devices would have, and stops verbs to devices whose link
+    is lost.
+    """
 
     def __init__(
         self,
@@ -85,7 +87,7 @@ class RegisterObserver:
             self._faults.strike(verb, arguments)
 
     def end(self, verb: str, failure: BaseException | None) -> None:
-        """Note the outcome of a demand. One that was refused before anything moved changed nothing."""
+        """Note the outcome of a demand in the register. One that was refused before anything moved changed nothing."""
         self._notice_losses()
         if verb in READS:
             return
@@ -171,7 +173,9 @@ class RegisteredBench(ObservedBench):
 
 
 class RegisteredDevices:
-    """Implements `bench_service.bench.devices.BenchDevices` by a register, without a world or a job."""
+    """Implements `bench_service.bench.devices.BenchDevices` for a simulated bench by its register, without a world or a
+    job.
+    """
 
     def __init__(self, register: DeviceRegister) -> None:
         self._register = register
@@ -180,11 +184,12 @@ class RegisteredDevices:
         return self._register.read()
 
     def compare(self, by: str) -> tuple[str, ...]:
-        """Nothing: simulated devices are what their register has."""
+        """Return no differences: simulated devices are as their register says."""
         return ()
 
     def make_safe(self, by: str) -> DeviceState:
-        """Stop, lead to ambient, switch off. The table of a dead process stops at once, at an unknown position.
+        """Stop the table, command the chamber to ambient, switch the unit off; return the state. The table of a dead
+        process stops at once, at an unknown position.
 
         A device whose link is lost stays as it is, and keeps no other from being made safe. The job whose demands are
         undone stays known until the next one.

@@ -1,4 +1,4 @@
-"""A bench file's devices as simulators that serve: the ports of its addresses, one world behind them."""
+"""A bench file's devices as simulators that listen on the file's addresses, with one simulated world behind them."""
 
 import tomllib
 from collections.abc import Callable
@@ -27,9 +27,14 @@ def served_bench(file: BenchFile, faults: Path | None = None) -> ServedBench:
     simulates within the driving process are not served. Raises `Misconfigured` for a driver whose
     protocol is not served, a truth or a plan of faults that cannot be used, and a frame's file of other frames.
     """
-    devices = {kind: _device(kind, section) for kind, section in file.real().items() if kind != "environment"}
+    devices: dict[str, ServedDevice] = {
+        kind: _device(kind, section) for kind, section in file.real().items() if kind != "environment"
+    }
     if not devices:
         raise Misconfigured(f"{file.path}: no device has an address, so there is nothing to serve")
+    person = file.rest.operator.address
+    if person is not None:
+        devices["operator"] = ServedDevice("person", person.host, person.port)
     try:
         config = ServedConfig(_world(file, "chamber" in devices), devices, file.time_factor, _plan(faults))
         bench = ServedBench(config, monotonic_s, pause_async)

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -125,6 +126,10 @@ class SimulatedDriver:
         faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}", cables)
         return self._asked(RegisteredBench(bench, link, cables, faults, bench.lost_links), job)
 
+    def warm_up(self) -> None:
+        """Load the filter of the unit's noise: half a second, of which the watchdog would see a table that hangs."""
+        import_module("scipy.signal")
+
     def world(
         self, unit: str, seed: int, needs: BenchNeeds, description: BenchDescription, clock: Clock
     ) -> "SimulatedBench":
@@ -159,11 +164,13 @@ class SimulatedDriver:
         return None if self._register is None else RegisteredDevices(self._register).device_state()
 
     def compare(self, by: str) -> tuple[str, ...]:
-        """Nothing: simulated devices are what their register has."""
+        """Return no differences: simulated devices are as their register says."""
         return ()
 
     def make_safe(self, by: str) -> DeviceState:
-        """Open the devices over the register, without a world. Raises `DeviceBusy`; `BenchError` without register."""
+        """Make the devices safe by the register, without a world, and return their state. Raises `DeviceBusy`;
+        `BenchError` without register.
+        """
         if self._register is None:
             raise BenchError(
                 "this bench has no device register: only the job that drives the bench can stop its devices"
@@ -171,7 +178,9 @@ class SimulatedDriver:
         return RegisteredDevices(self._register).make_safe(by)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
-        """Bias and matrix of the job's launch at the unit's reference temperature, run-to-run changes included."""
+        """Return bias and matrix of each triad in the job's launch, at the unit's reference temperature, run-to-run
+        changes included.
+        """
         from simulators.world import launch_truth
 
         found = launch_truth(self._config(unit, seed))
@@ -209,7 +218,9 @@ class SimulatedDriver:
 
 
 def drawn_unit(serial: str) -> Unit | None:
-    """A unit that every simulated bench has by drawing it from its serial, as declared; None for another serial."""
+    """Return the unit of a serial like RANDOM-7, drawn from it, which every simulated bench has; None for another
+    serial.
+    """
     truth = _drawn_truth(serial)
     return None if truth is None else declared_unit(truth)
 
@@ -220,7 +231,7 @@ def _drawn_truth(serial: str) -> UnitTruth | None:
 
 
 def synthetic_rates(noise: NoiseCoefficients, rate_hz: float, count: int, seed: int) -> Iterator[Array]:
-    """Blocks of rates of a chosen noise, for synthetic recordings."""
+    """Yield blocks of rates of a chosen noise, (n,), for synthetic recordings."""
     from simulators.imu.synthesis import synthesise
 
     return synthesise(noise, rate_hz, count, seed)

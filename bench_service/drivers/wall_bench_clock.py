@@ -4,7 +4,9 @@ from bench_service.wall_clock import monotonic_s, pause_async
 
 
 class WallBenchClock:
-    """Implements `procedures.bench.clock.Clock` by real time, or by that of served simulators at a time factor."""
+    """Clock of a bench with real devices. Implements `procedures.bench.clock.Clock` by real time, or by that of served
+    simulators at a time factor.
+    """
 
     def __init__(self, passed_s: float = 0.0, factor: float = 1.0) -> None:
         """Begin at a bench time [s]: 0 for a job's first launch, later for one that continues after a restart.

@@ -1,4 +1,6 @@
-"""Admission of heavy requests: so many at a time, within so much memory; others wait or are refused."""
+"""Admission control of memory-heavy HTTP requests: at most so many at a time, within so much memory; others wait or are
+refused. Not the check of a job: that is `bench_service.jobs.service`.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -26,7 +28,9 @@ def available_bytes() -> int | None:
 
 
 class Places:
-    """Places for requests that hold memory while they last. For any thread."""
+    """A limited number of places and bytes of memory for requests, each held while its request lasts. For any
+    thread.
+    """
 
     def __init__(self, what: str, most: int, most_bytes: int) -> None:
         """Set up for at most `most` requests at a time, with `most_bytes` of memory together.
@@ -65,7 +69,9 @@ class Places:
 
 
 class Turns:
-    """Work that takes the processor: a few pieces at a time in threads of their own, some wait, more are refused."""
+    """Runs work that takes the processor: a few pieces at a time in threads of their own, some wait, more are
+    refused.
+    """
 
     def __init__(self, what: str, at_once: int, waiting: int) -> None:
         """Set up for `at_once` pieces of work and `waiting` more; `what`: the requests in the plural."""
@@ -75,7 +81,9 @@ class Turns:
         self._limiter = CapacityLimiter(at_once)
 
     async def run(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        """Run the work in a thread once it is its turn. Raises `Overloaded`, and its errors."""
+        """Wait for a turn, run the work in a thread, and return its result. Raises `Overloaded`, and the errors of the
+        work.
+        """
         if self._inside >= self._most:
             raise Overloaded(f"{self._inside} {self._what} are running or waiting already: try again later")
         self._inside += 1

@@ -29,7 +29,7 @@ from procedures.procedure import DatedCalibration, Evidence, Method, Parameters
 
 @dataclass(frozen=True)
 class AnalysisRequest:
-    """A method and its inputs."""
+    """A client's request for an analysis: a method, its recordings or calibrations, parameters, unit."""
 
     method: str
     recordings: tuple[str, ...] = ()
@@ -55,7 +55,9 @@ class _Inputs:
 
 
 class AnalysisService:
-    """Runs methods and analyses on stored evidence; each call returns with its result stored."""
+    """Runs methods and second analyses on stored evidence, in processes of their own; each call returns with its result
+    stored.
+    """
 
     def __init__(
         self,
@@ -76,7 +78,9 @@ class AnalysisService:
         self._code_version = code_version
 
     def analyse_again(self, job_id: str, parameters: dict[str, Any], key: str | None = None) -> StoredResult:
-        """Analyse a job's recordings with other parameters; the first result stays as it is."""
+        """Analyse a job's recordings with other parameters, store the result and return it; the first result stays as
+        it is. Raises `NotFound`, `DomainError`, `ValidationError`.
+        """
         idempotency = Idempotency.of("again", key, [job_id, parameters])
         known = self._stores.keys.made(idempotency, "result")
         if known is not None:
@@ -93,7 +97,9 @@ class AnalysisService:
         return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)
 
     def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
-        """Run a method on stored recordings or calibrations. Raises `NotFound`, `DomainError`, `ValidationError`."""
+        """Run a method on stored recordings or calibrations, store the result and return it. Raises `NotFound`,
+        `DomainError`, `ValidationError`.
+        """
         idempotency = Idempotency.of("analyses", key, request)
         known = self._stores.keys.made(idempotency, "result")
         if known is not None:
@@ -113,7 +119,7 @@ class AnalysisService:
         return self._run(request, None, reuse=True)
 
     def computed(self, request: AnalysisRequest) -> Computed:
-        """The result of a method with the calibrations and corrections that it gives; nothing is stored.
+        """Return the result of a method with the calibrations and corrections that it gives; nothing is stored.
 
         Raises `NotFound`, `DomainError`, `ValidationError`.
         """

@@ -23,7 +23,8 @@ from procedures.core.errors import BadParameter
 def calibration_subject(
     stores: EvidenceStores, unit: str, calibration_id: str, other: str | None
 ) -> CalibrationSubject:
-    """The calibration of one triad, and that of the other one: `other`, else of the same result, else the current one.
+    """Return the calibration of one triad, with that of the other one: `other`, else of the same result, else the
+    current one.
 
     A current calibration that may not be used is not added by itself. Raises `NotFound`, `BadParameter`.
     """
@@ -53,7 +54,9 @@ def calibration_subject(
 def export_calibration(
     stores: EvidenceStores, unit: str, calibration_id: str, form: CalibrationForm, other: str | None = None
 ) -> ExportedCalibration:
-    """The file of a calibration in a form. Raises `NotFound`, `BadParameter` where the form cannot hold it."""
+    """Return a calibration as a file for other software, with its name and media type. Raises `NotFound`,
+    `BadParameter` where the form cannot hold it.
+    """
     subject = calibration_subject(stores, unit, calibration_id, other)
     if other is None and takes_one_triad(form) and form is not CalibrationForm.KALIBR_IMU:
         subject = copied(

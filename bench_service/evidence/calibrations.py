@@ -13,12 +13,14 @@ from bench_service.model.records import Idempotency, Page
 
 
 class CalibrationStore(Protocol):
-    """History and choice of calibrations."""
+    """Store of calibrations: history, choice of the current one, decisions of people. Interface; the SQL is in
+    `persistence`.
+    """
 
     def list(
         self, unit: str, *, triad: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[StoredCalibration]:
-        """A unit's calibrations, newest first."""
+        """Return one page of a unit's calibrations, of one triad or both, newest first."""
         ...
 
     def get(self, calibration_id: str) -> StoredCalibration:
@@ -26,25 +28,27 @@ class CalibrationStore(Protocol):
         ...
 
     def several(self, ids: Sequence[str]) -> tuple[StoredCalibration, ...]:
-        """Calibrations by their ids, in the order given. Raises `NotFound`."""
+        """Return the calibrations with these ids, in the order given. Raises `NotFound`."""
         ...
 
     def current(self, unit: str) -> tuple[StoredCalibration, ...]:
-        """The unit's current calibrations, at most one a triad; usable or not."""
+        """Return the unit's current calibrations, at most one a triad; usable or not."""
         ...
 
     def of_results(self, results: Sequence[str]) -> tuple[StoredCalibration, ...]:
-        """Calibrations that results gave, in the order of the results; gyros before accelerometers."""
+        """Return the calibrations that results gave, in the order of the results; gyros before accelerometers."""
         ...
 
     def used_by(self, calibration_id: str) -> tuple[str, ...]:
-        """Ids of the results that rest on a calibration, newest first."""
+        """Return the ids of the results that rest on a calibration, newest first."""
         ...
 
     def add(
         self, calibration: StoredCalibration, by: Decider, choose: bool, idempotency: Idempotency | None = None
     ) -> StoredCalibration:
-        """Store a calibration that a person entered, and choose it where wanted. Raises `IdempotencyConflict`."""
+        """Store a calibration that a person entered, make it current where `choose` is true, and return it. Raises
+        `IdempotencyConflict`.
+        """
         ...
 
     def choose(
@@ -71,11 +75,15 @@ class CalibrationStore(Protocol):
         valid_until: datetime | None,
         idempotency: Idempotency | None = None,
     ) -> StoredCalibration:
-        """Approve a calibration, with the end of its validity where one is given. Raises `NotFound`."""
+        """Store a person's approval of a calibration, with the end of its validity where one is given, and return it.
+        Raises `NotFound`.
+        """
         ...
 
     def reject(
         self, unit: str, calibration_id: str, by: Decider, idempotency: Idempotency | None = None
     ) -> StoredCalibration:
-        """Reject a calibration: it is not used any more, also where it is current. Raises `NotFound`."""
+        """Store a person's rejection of a calibration and return it: it is not used any more, also where it is current.
+        Raises `NotFound`.
+        """
         ...

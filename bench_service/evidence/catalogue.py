@@ -6,6 +6,7 @@ All of them import the whole of the numerics, which takes most of a second; a si
 import logging
 from collections.abc import Mapping
 from functools import cached_property
+from threading import Thread
 from typing import Any, TypeVar
 
 from bench_service.model.errors import NotFound
@@ -23,21 +24,24 @@ log = logging.getLogger(__name__)
 
 
 class Catalogue:
-    """Procedures and methods by name. A file that cannot be read is left out, and named in the log and in `notes`."""
+    """Procedures and methods by name, imported from their folders. A file that cannot be read is left out, and named in
+    the log and in `notes`.
+    """
 
     def __init__(self) -> None:
         self._left_out: dict[tuple[str, str], str] = {}
         self._alone: dict[tuple[str, str], Any] = {}
         """Entries that were read by their names, before or apart from all the others."""
+        self._reading: Thread | None = None
 
     @cached_property
     def procedures(self) -> Mapping[str, AnyProcedure]:
-        """Every procedure by name, read when it is first wanted."""
+        """All procedures by name; their files are imported at the first use."""
         return self._read("procedure", catalog.find())
 
     @cached_property
     def methods(self) -> Mapping[str, AnyMethod]:
-        """Every method by name, read when it is first wanted."""
+        """All methods by name; their files are imported at the first use."""
         return self._read("method", methods.find())
 
     def procedure(self, name: str) -> AnyProcedure:
@@ -48,12 +52,30 @@ class Catalogue:
         """Return a method by name. Raises `NotFound`, with the reason where its file is broken."""
         return self._required("method", name)
 
+    def titles(self) -> Mapping[str, str]:
+        """Title of each procedure and method by its name, of those that have been read.
+
+        Reading them all takes a second or two: the first call begins it in a thread and waits for nothing.
+        """
+        if "procedures" in self.__dict__ and "methods" in self.__dict__:
+            return self._titles
+        if self._reading is None:
+            self._reading = Thread(target=lambda: self._titles, name="titles", daemon=True)
+            self._reading.start()
+        return {name: entry.title for (_, name), entry in list(self._alone.items())}
+
+    @cached_property
+    def _titles(self) -> Mapping[str, str]:
+        return {name: entry.title for name, entry in (*self.methods.items(), *self.procedures.items())}
+
     def notes(self) -> tuple[str, ...]:
-        """A sentence for each file that was left out so far."""
+        """Return a sentence for each file that was left out so far."""
         return tuple(self._left_out.values())
 
     def report(self, result: StoredResult) -> Report:
-        """Lay out a stored result for a person: tables and figures."""
+        """Return a stored result laid out for a person: tables and figures. Where its procedure is gone, a report that
+        says so.
+        """
         try:
             entry = self._required(result.kind, result.name)
         except NotFound:

@@ -9,7 +9,7 @@ from bench_service.model.errors import NotFound
 
 @dataclass(frozen=True)
 class CheckedTriad:
-    """A calibration that a certificate is about, held against the stored one."""
+    """A calibration that a certificate is about, compared with the stored one."""
 
     calibration: str
     triad: str
@@ -21,7 +21,7 @@ class CheckedTriad:
 
 @dataclass(frozen=True)
 class Checked:
-    """The outcome of a check."""
+    """Outcome of the check of a certificate: valid or not, signer, unit, calibrations, and a sentence a fault."""
 
     valid: bool
     signed_by: str | None
@@ -32,7 +32,9 @@ class Checked:
 
 
 def check_certificate(stored: CalibrationStore, data: bytes, pinned: bytes) -> Checked:
-    """Check a certificate's XML against the laboratory's PEM certificate. What is wrong is said in `faults`."""
+    """Check a certificate's XML against the laboratory's PEM certificate, and return the outcome. Raises nothing for a
+    bad certificate: each fault is a sentence in `faults`.
+    """
     from bench_service.formats.certificate.errors import CertificateRefused
     from bench_service.formats.certificate.rules import attached, faults
     from bench_service.formats.certificate.signature import verified

@@ -1,4 +1,6 @@
-"""PORT of memory for the correction sets of units, stored with the result that gives them (`store.ResultStore.add`)."""
+"""Interface of the store of units' correction sets, which come in with the result that gives them
+(`ResultStore.add`).
+"""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -6,12 +8,13 @@ from typing import Protocol
 
 from bench_service.model.calibrations import Act, Approval, Decider, Decision
 from bench_service.model.records import Idempotency, Page
+from procedures.core.limits import Verdict
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
 
 
 @dataclass(frozen=True)
 class StoredCorrection:
-    """A correction set in a unit's history; of each kind one is current, or none."""
+    """A correction set in a unit's history; of each kind at most one is current."""
 
     id: str
     unit: str
@@ -20,14 +23,50 @@ class StoredCorrection:
     current: bool
     correction: UnitCorrection
     simulated: bool
+    verdict: Verdict
+    """Verdict of the result that gave it."""
+    of_job: bool
+    """True where a job gave it as its own result; False for a second analysis and for a method."""
     approval: Approval = Approval.OPEN
     valid_until: datetime | None = None
     """End of its validity; None: it has none."""
     decisions: tuple[Decision, ...] = ()
     """All decisions about it, oldest first; `calibration_id` of each is this correction's id."""
 
+    @property
+    def by_rule(self) -> bool:
+        """Whether the rule made it current; False where a person chose it, and while it is not current."""
+        choices = [d for d in self.decisions if d.act in (Act.CHOSEN, Act.GIVEN_BACK)]
+        return self.current and (not choices or choices[-1].act is Act.GIVEN_BACK)
+
+    def gives_way(self, at: datetime) -> bool:
+        """Whether the rule may put another one in its place: a person's choice stands while it may be used."""
+        return self.by_rule or bool(self.unusable(at))
+
+    @property
+    def why_not_current(self) -> str:
+        """Reason why it is not its kind's current one, with the way out; empty where it is."""
+        what = f"correction {self.id} of the kind {self.correction.kind!r}"
+        if self.current:
+            return ""
+        if any(d.act is Act.CHOSEN for d in self.decisions):
+            return (
+                f"{what} was chosen by a person, and another one has taken its place since; choose it again to use it"
+            )
+        if self.verdict is not Verdict.PASS:
+            return (
+                f"{what} comes from result {self.result_id}, whose verdict is {self.verdict}: only one of a job that "
+                "passed becomes current by itself; choose it with a remark to use it nevertheless"
+            )
+        if not self.of_job:
+            return f"{what} comes from a second analysis or a method: it counts only where a person chooses it"
+        return (
+            f"{what} is not the current one: a newer one of a job that passed took its place, or one that a person "
+            "chose stands; choose it to use it"
+        )
+
     def unusable(self, at: datetime) -> str:
-        """Reason why it may not be used at a time, with the way out; empty where it may."""
+        """Return the reason why it may not be used at a time, with the way out; empty where it may."""
         what = f"correction {self.id} of the kind {self.correction.kind!r}"
         other = "make another correction of its history current, or run the job that gives one again"
         if self.approval is Approval.REJECTED:
@@ -41,12 +80,14 @@ class StoredCorrection:
 
 
 class CorrectionStore(Protocol):
-    """History and choice of correction sets. Every method is one transaction."""
+    """Store of correction sets: history and choice. Every method is one transaction. Interface; the SQL is in
+    `persistence`.
+    """
 
     def list(
         self, unit: str, *, kind: CorrectionKind | None = None, after: str | None = None, limit: int = 50
     ) -> Page[StoredCorrection]:
-        """A unit's corrections, newest first."""
+        """Return one page of a unit's corrections, of one kind or all, newest first."""
         ...
 
     def get(self, unit: str, correction_id: str) -> StoredCorrection:
@@ -56,7 +97,7 @@ class CorrectionStore(Protocol):
     def current(self, unit: str, kind: CorrectionKind) -> StoredCorrection | None: ...
 
     def used_by(self, correction_id: str) -> tuple[str, ...]:
-        """Ids of the results that rest on a correction, newest first."""
+        """Return the ids of the results that rest on a correction, newest first."""
         ...
 
     def make_current(
@@ -69,6 +110,13 @@ class CorrectionStore(Protocol):
         """
         ...
 
+    def choose_by_rule(self, unit: str, kind: CorrectionKind, by: Decider) -> StoredCorrection:
+        """Give a kind back to the rule: its newest usable correction by a job that passed becomes current.
+
+        Raises `CorrectionRefused` where there is none.
+        """
+        ...
+
     def approve(
         self,
         unit: str,
@@ -77,11 +125,15 @@ class CorrectionStore(Protocol):
         valid_until: datetime | None,
         idempotency: Idempotency | None = None,
     ) -> StoredCorrection:
-        """Approve a correction, with the end of its validity where one is given. Raises `NotFound`."""
+        """Store a person's approval of a correction, with the end of its validity where one is given, and return it.
+        Raises `NotFound`.
+        """
         ...
 
     def reject(
         self, unit: str, correction_id: str, by: Decider, idempotency: Idempotency | None = None
     ) -> StoredCorrection:
-        """Reject a correction: no new job uses it, also where it is current. Raises `NotFound`."""
+        """Store a person's rejection of a correction and return it: no new job uses it, also where it is current.
+        Raises `NotFound`.
+        """
         ...

@@ -13,7 +13,9 @@ from procedures.procedure import Outcome
 
 
 def document_of(outcome: Outcome) -> dict[str, Any]:
-    """The result as JSON. Raises `UnfitResult` naming the first value that cannot be stored."""
+    """Return the result of an analysis as a JSON object. Raises `UnfitResult` naming the first value that cannot be
+    stored.
+    """
     document = outcome.model_dump(mode="json")
     require_fit(document, "a result")
     return document

@@ -22,7 +22,7 @@ SLACK = timedelta(minutes=5)
 
 @dataclass(frozen=True)
 class EnteredCoefficient:
-    """One coefficient as a person typed it."""
+    """One coefficient as a person typed it: name, value, unit, standard uncertainty."""
 
     name: str
     """Symbol as in `COEFFICIENT_NAMES`: "b_x", "K11", …"""
@@ -35,7 +35,7 @@ class EnteredCoefficient:
 
 @dataclass(frozen=True)
 class Entry:
-    """Known coefficients of a triad with their origin."""
+    """Known coefficients of a triad as a person entered them, with their origin and validity."""
 
     triad: str
     origin: str
@@ -50,7 +50,9 @@ class Entry:
 
 
 def stored_calibration(unit: str, entry: Entry) -> StoredCalibration:
-    """The entered calibration of a unit, ready to be stored. Raises `BadParameter` naming field, value and range."""
+    """Return the entered calibration of a unit, converted to SI, ready to be stored. Raises `BadParameter` naming
+    field, value and range.
+    """
     if not entry.origin.strip():
         raise BadParameter("origin", entry.origin, "the source of the numbers: a passport, a certificate, a table")
     at = now()

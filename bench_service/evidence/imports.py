@@ -1,4 +1,4 @@
-"""Import of recorded files as recordings of a unit."""
+"""Imports recorded files as recordings of a unit, and makes synthetic recordings."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
@@ -56,7 +56,9 @@ def require_real(serial: str) -> None:
 
 
 class ImportService:
-    """Stores recorded files as recordings, and synthetic ones."""
+    """Imports recorded files as recordings, by way of the process that reads files; also stores synthetic
+    recordings.
+    """
 
     def __init__(self, stores: EvidenceStores, synthetic: SyntheticRates | None = None) -> None:
         """Set up with the source of synthetic noise; None: there is none here."""
@@ -65,7 +67,7 @@ class ImportService:
         self._reader = FileReader()
 
     def close(self) -> None:
-        """End the process that reads files."""
+        """End the process that reads files, and wait for it."""
         self._reader.close()
 
     def discard_crashed(self) -> int:
@@ -75,7 +77,8 @@ class ImportService:
     def import_recording(
         self, files: Sequence[ImportFile], description: ImportDescription, key: str | None = None
     ) -> RecordingInfo:
-        """Store recorded files as one recording of a unit, which is registered where it is new.
+        """Read recorded files, store them as one recording of a unit, which is registered where it is new, and return
+        its description.
 
         Raises `DomainError` naming file and row, `StorageFull`; then nothing of the recording remains.
         """
@@ -120,7 +123,7 @@ class ImportService:
             raise
 
     def describe(self, file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
-        """Propose a description of a file, for a person to confirm; nothing is stored. Raises `DomainError`."""
+        """Return a proposed description of a file, for a person to confirm; nothing is stored. Raises `DomainError`."""
         with _in_service_words():
             return self._reader.describe(file, unit, form, table)
 

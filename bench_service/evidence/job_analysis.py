@@ -10,6 +10,7 @@ from bench_service.evidence.stores import EvidenceStores
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 from bench_service.wall_clock import new_id, now
+from procedures.analysis.measured_pace import fell_behind
 from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
@@ -29,7 +30,9 @@ class Analysed:
 
 
 def recordings_of(stores: EvidenceStores, job_id: str) -> list[Recording]:
-    """A job's complete recordings for an analysis, in the order of their stations."""
+    """Return a job's complete recordings for an analysis, in the order of their stations; samples are read when they
+    are used.
+    """
     return [stores.recordings.load(stored.info.id) for stored in stores.recordings.of_job(job_id)]
 
 
@@ -41,17 +44,18 @@ def analysed(
     recordings: Sequence[Recording],
     code_version: str,
 ) -> Analysed:
-    """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters.
+    """Run a procedure's analysis on a job's recordings, and return the result, not stored yet.
 
-    A value that cannot be stored, NaN above all, is `UnfitResult`.
+    Raises `DomainError`, `ValidationError` for the parameters. A value that cannot be stored, NaN above all, is
+    `UnfitResult`.
     """
     if len(recordings) != len(job.stations):
         raise UnfitRecording(f"job {job.id} has {len(recordings)} of its {len(job.stations)} recordings")
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = analyse_procedure(procedure, recordings, params, context)
-    overdue = context.bench.overdue(job.created_at.date().isoformat())
-    if overdue:
-        outcome = outcome.model_copy(update={"warnings": (*overdue, *outcome.warnings)})
+    said = (*context.bench.overdue(job.created_at.date().isoformat()), *fell_behind([r.info for r in recordings]))
+    if said:
+        outcome = outcome.model_copy(update={"warnings": (*said, *outcome.warnings)})
     used = (context.unit.calibration_id(triad) for triad in procedure.uses_calibration)
     stored = StoredResult(
         id=new_id(),

@@ -1,4 +1,4 @@
-"""PORT of memory for clients' idempotency keys, with the object that each key made."""
+"""Interface of the store of clients' idempotency keys, with the object that each key made."""
 
 from typing import Protocol
 
@@ -6,7 +6,7 @@ from bench_service.model.records import Idempotency
 
 
 class KeyStore(Protocol):
-    """The objects that clients' idempotency keys made."""
+    """Store of clients' idempotency keys: which object each key made. Interface; the SQL is in `persistence`."""
 
     def made(self, idempotency: Idempotency | None, kind: str) -> str | None:
         """Id of the "job", "recording", "result", "campaign", "campaign_run", "schedule" or "batch" that a key

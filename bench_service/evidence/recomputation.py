@@ -29,7 +29,7 @@ LISTED = 20
 
 @dataclass(frozen=True)
 class RecordingCheck:
-    """A recording of the result: the hash that the result names, and that of the samples now."""
+    """A recording of a result: the content hash that the result names, and the hash of the stored samples now."""
 
     id: str
     stated: str
@@ -37,7 +37,7 @@ class RecordingCheck:
 
     @property
     def same(self) -> bool:
-        """Whether the samples are those that the result was computed from."""
+        """True where the samples are those from which the result was computed."""
         return self.stated == self.found
 
 
@@ -54,7 +54,7 @@ class CalibrationCheck:
 
 @dataclass(frozen=True)
 class Recomputation:
-    """A result computed again from the stored samples."""
+    """Comparison of a result that was computed again from the stored samples with the stored one."""
 
     result: str
     raw_data_same: bool
@@ -75,7 +75,7 @@ RECOMPUTATION = TypeAdapter(Recomputation)
 
 
 class RecomputationService:
-    """Computes stored results again."""
+    """Computes stored results again from their raw data; stores nothing."""
 
     def __init__(
         self,
@@ -93,7 +93,9 @@ class RecomputationService:
         self._processes = processes
 
     def recomputed(self, result_id: str) -> Recomputation:
-        """Compute a result again. Raises `NotFound`, `DomainError`, `ValidationError` for what cannot be any more."""
+        """Compute a result again and return the comparison with the stored one. Raises `NotFound`, `DomainError`,
+        `ValidationError` where that is not possible any more.
+        """
         result = self._stores.results.get(result_id)
         if self._processes is not None:
             return RECOMPUTATION.validate_json(self._processes.result("recompute", result_id))
@@ -119,7 +121,9 @@ class RecomputationService:
         )
 
     def as_json(self, result_id: str) -> str:
-        """The same as JSON, for an answer between processes."""
+        """Compute a result again and return the comparison as JSON text, for an answer between processes; raises as
+        `recomputed`.
+        """
         return RECOMPUTATION.dump_json(self.recomputed(result_id)).decode()
 
     def _outcome(self, result: StoredResult) -> tuple[str, dict[str, Any], Sequence[TriadCalibration]]:
@@ -150,7 +154,7 @@ class RecomputationService:
 
 
 def digest_of(recordings: RecordingStore, recording_id: str) -> str:
-    """Compute the content hash of a recording from its stored samples, a chunk at a time. Raises `NotFound`."""
+    """Return the content hash of a recording, computed from its stored samples a chunk at a time. Raises `NotFound`."""
     stored = recordings.get(recording_id)
     info = stored.info
     blocks = recordings.read(recording_id, [c.name for c in info.channels], 0, info.count)

@@ -1,4 +1,4 @@
-"""PORT of memory for recordings and their raw samples, while they are made and afterwards.
+"""Interfaces of the store of recordings and their raw samples, while they are made and afterwards.
 
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
@@ -32,10 +32,14 @@ class DamagedChunk:
 
 
 class RecordingWriter(Protocol):
-    """Writer of one recording. Chunks are committed as they fill; the recording is not listed before `seal`."""
+    """Writer of one recording. Chunks are committed as they fill; the recording is not listed before `seal`. Interface;
+    the SQL is in `persistence`.
+    """
 
     def write(self, block: RawArray) -> None:
-        """Append samples, shape (n, channels), in the order of the channels. Raises `StorageFull`."""
+        """Append samples, shape (n, channels), in the order of the channels; a full chunk is committed. Raises
+        `StorageFull`.
+        """
         ...
 
     def seal(self, checkpoint: dict[str, Any] | None = None, measured: Measured | None = None) -> RecordingInfo:
@@ -54,20 +58,20 @@ class RecordingWriter(Protocol):
 
 
 class RecordingSoFar(Recording, Protocol):
-    """The part of a recording that is stored; `count` of its `info` is that part's."""
+    """The stored part of a recording that may still be growing; `count` of its `info` is that part's. Interface."""
 
     def since(self, start: int) -> Iterator[RawArray]:
-        """The raw samples from sample `start` on, each block (n, channels)."""
+        """Yield the raw samples from sample `start` on, in blocks of shape (n, channels)."""
         ...
 
 
 class RecordingStore(Protocol):
-    """The stored recordings and their samples."""
+    """Store of recordings and their samples. Interface; the SQL is in `persistence`."""
 
     def open(self, new: NewRecording) -> RecordingWriter: ...
 
     def get(self, recording_id: str) -> StoredRecording:
-        """Return one recording's row. Raises `NotFound`."""
+        """Return one recording's row, without samples. Raises `NotFound`."""
         ...
 
     def list(
@@ -82,15 +86,17 @@ class RecordingStore(Protocol):
     ) -> Page[StoredRecording]: ...
 
     def of_job(self, job_id: str) -> tuple[StoredRecording, ...]:
-        """The complete recordings of a job in the order of their stations."""
+        """Return the complete recordings of a job in the order of their stations, without samples."""
         ...
 
     def load(self, recording_id: str) -> RecordingSoFar:
-        """The recording for an analysis: blocks are read chunk by chunk. Raises `NotFound`, `RawDataRemoved`."""
+        """Return a recording for an analysis: its blocks are read chunk by chunk when they are used. Raises `NotFound`,
+        `RawDataRemoved`.
+        """
         ...
 
     def so_far(self, job_id: str) -> "RecordingSoFar | None":
-        """The stored part of the recording that a job is making now; None where nothing of one is stored yet."""
+        """Return the stored part of the recording that a job is making now; None where nothing of one is stored yet."""
         ...
 
     def read(
@@ -110,15 +116,15 @@ class RecordingStore(Protocol):
         ...
 
     def checkpoint(self, job_id: str) -> dict[str, Any] | None:
-        """State of the simulated world after the job's last complete recording."""
+        """Return the state of the simulated world after the job's last complete recording; None where there is none."""
         ...
 
     def discard_open_imports(self, before: datetime) -> int:
-        """Remove orphaned imports, begun before a moment and never sealed. Returns their number."""
+        """Remove orphaned imports, begun before a moment and never sealed. Return their number."""
         ...
 
     def interrupt_open(self, job_id: str) -> int:
-        """Close a job's open recordings after a crash (see `RecordingWriter.abandon`). Returns their number."""
+        """Close a job's open recordings after a crash (see `RecordingWriter.abandon`). Return their number."""
         ...
 
 

@@ -1,6 +1,6 @@
-"""PORT of memory for results, the calibrations and corrections that come with them, and lineage.
+"""Interface of the store of results, the calibrations and corrections that come with them, and lineage.
 
-Every method is one transaction, as in `store`.
+Every method is one transaction.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from procedures.core.unit_correction import UnitCorrection
 
 
 class ResultStore(Protocol):
-    """The stored results of analyses."""
+    """Store of results of analyses with their lineage. Interface; the SQL is in `persistence`."""
 
     def add(
         self,
@@ -28,7 +28,8 @@ class ResultStore(Protocol):
         """Store a result with its lineage, calibrations and corrections, in one transaction.
 
         Calibrations, at most one of a triad, join the unit's history; where `by_rule` is true, those that
-        `model.calibrations.takes_over` allows become current. Corrections, at most one of a kind, become current there.
+        `model.calibrations.takes_over` allows become current. Corrections, at most one of a kind, become current there
+        where the result passed.
         `content`: the digest of everything that the analysis read; with `reuse` a result of that content that is
         stored already is returned, and nothing is added.
         Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.
@@ -40,7 +41,7 @@ class ResultStore(Protocol):
         ...
 
     def of_content(self, content: str) -> StoredResult | None:
-        """The stored result of a content, see `add`; None where there is none."""
+        """Return the stored result of a content digest, see `add`; None where there is none."""
         ...
 
     def list(
@@ -55,7 +56,9 @@ class ResultStore(Protocol):
     ) -> Page[StoredResult]: ...
 
     def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
-        """The newest result of the procedure that gave a job of the unit its verdict; no second analysis."""
+        """Return the newest result of the procedure that gave a job of the unit its verdict, no second analysis; None
+        where there is none.
+        """
         ...
 
     def values(
@@ -76,5 +79,5 @@ class ResultStore(Protocol):
         ...
 
     def of_recording(self, recording_id: str) -> tuple[str, ...]:
-        """Ids of the results that used a recording."""
+        """Return the ids of the results that used a recording."""
         ...

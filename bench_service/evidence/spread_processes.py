@@ -43,7 +43,9 @@ MODULES = (
 
 
 class SpreadProcesses:
-    """Processes of one service that work out parts of analyses, a `Spread`. For any thread."""
+    """Processes of one service that compute parts of analyses at the same time. Implements
+    `procedures.core.spread.Spread`. For any thread.
+    """
 
     width = AT_ONCE
 
@@ -86,7 +88,9 @@ class SpreadProcesses:
             self._given_back()
 
     def each(self, work: Callable[[A], R], items: Sequence[A]) -> list[R]:
-        """Work out the parts in these processes; see `Spread.each`."""
+        """Compute the parts in these processes, wait, and return their results in order; see `Spread.each`. Raises the
+        first error of a part.
+        """
         pool = self._taken()
         try:
             if pool is None:
@@ -105,12 +109,12 @@ class SpreadProcesses:
         return found
 
     def processes(self) -> list[int]:
-        """Process ids of the processes that there are."""
+        """Return the process ids of the processes that run now."""
         with self._mutex:
             return [] if self._pool is None else list(getattr(self._pool, "_processes", {}))
 
     def close(self) -> None:
-        """End the processes; parts that are under way are cut off."""
+        """End the processes for good; parts that are under way are cut off."""
         self._closed = True
         self._end()
 
@@ -156,7 +160,7 @@ class SpreadProcesses:
 
 
 def spread_processes(closing: ExitStack) -> SpreadProcesses:
-    """Processes that `closing` ends; none is begun yet."""
+    """Return processes for analyses, which `closing` ends; none is started yet."""
     processes = SpreadProcesses()
     closing.callback(processes.close)
     return processes

@@ -1,5 +1,5 @@
-"""Stores of the evidence room: units, recordings, results, calibrations, corrections, batches of analyses,
-and clients' idempotency keys.
+"""Stores that `evidence` needs: units, recordings, results, calibrations, corrections, batches of analyses, and
+clients' idempotency keys.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from bench_service.evidence.units import UnitStore
 
 @dataclass(frozen=True)
 class EvidenceStores(AccessStores):
-    """The stores of this room and of those below it."""
+    """The stores that `evidence` needs, with those of `access` and the packages below it, as one value."""
 
     units: UnitStore
     unit_notes: UnitNoteStore

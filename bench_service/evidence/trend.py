@@ -12,7 +12,7 @@ from procedures.analysis.control_chart import LEAST_POINTS, ControlLimits, Signa
 
 @dataclass(frozen=True)
 class TrendPoint:
-    """The value of one result."""
+    """The value of the quantity in one result, with its uncertainty, time and code version."""
 
     result: str
     job: str | None
@@ -41,7 +41,7 @@ class Trend:
 
 
 def trend_of(values: Sequence[ResultValue], unit: str, procedure: str, name: str, judged: int = 0) -> Trend:
-    """Make a chart of results, oldest first; its limits rest on all points but the last `judged`.
+    """Return the control chart of results, given oldest first; its limits rest on all points but the last `judged`.
 
     Points have the newest one's unit: where a version of the procedure changed the unit, the chart starts there.
     """
@@ -56,7 +56,7 @@ def trend_of(values: Sequence[ResultValue], unit: str, procedure: str, name: str
 
 
 def value_of(result: StoredResult, name: str) -> ResultValue:
-    """Take a quantity from one result. Raises `NotFound`, naming the known quantities."""
+    """Return the value of a quantity from one result. Raises `NotFound`, naming the known quantities."""
     found = quantity(result.document, name)
     about = {"result": result.id, "job": result.job_id, "at": result.created_at}
     return copied(ResultValue, result, **about, quantity=found)

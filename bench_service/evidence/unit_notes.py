@@ -1,4 +1,4 @@
-"""PORT of memory for remarks about units."""
+"""Interface of the store of remarks about units."""
 
 from typing import Protocol
 
@@ -7,12 +7,14 @@ from bench_service.model.records import Idempotency, Page
 
 
 class UnitNoteStore(Protocol):
-    """PORT: remarks of people about units."""
+    """Store of people's remarks about units. Interface; the SQL is in `persistence`."""
 
     def add(self, note: UnitNote, idempotency: Idempotency | None = None) -> UnitNote:
-        """Store a remark; with a key that is known, return the one that it made."""
+        """Store a remark. A known key returns the remark that it stored before. Raises `IdempotencyConflict` for a key
+        of another request.
+        """
         ...
 
     def list(self, unit: str, *, after: str | None = None, limit: int = 50) -> Page[UnitNote]:
-        """List a unit's remarks, newest first."""
+        """Return one page of a unit's remarks, newest first."""
         ...

@@ -1,4 +1,4 @@
-"""PORT of memory for units under test, as they are declared."""
+"""Interface of the store of units under test, as they are declared."""
 
 from typing import Protocol
 
@@ -7,10 +7,12 @@ from procedures.core.unit import Unit
 
 
 class UnitStore(Protocol):
-    """Units under test by serial: the declared record of each."""
+    """Store of units under test by serial: the declared record of each. Interface; the SQL is in `persistence`."""
 
     def put_unit(self, unit: Unit) -> None:
-        """Create or replace a unit. Its calibrations and corrections are not stored here: `ResultStore` has them."""
+        """Store or replace a unit's record. Its calibrations and corrections are not stored here: `ResultStore` has
+        them.
+        """
         ...
 
     def unit(self, serial: str) -> Unit:

@@ -37,7 +37,7 @@ class _Found:
 
 
 class UpkeepService:
-    """Checks of one database and their reports."""
+    """Size and check of one database, and the reports of checks, for clients and for the night."""
 
     def __init__(self, stores: EvidenceStores, database: DatabasePort, by: str) -> None:
         """Set up with `by`, the name of this process in reports."""
@@ -46,7 +46,7 @@ class UpkeepService:
         self._by = by
 
     def size(self) -> DatabaseSize:
-        """Read the size of the database. Raises `StorageFailure`."""
+        """Return the size of the database [bytes], and its revision. Raises `StorageFailure`."""
         return self._database.size()
 
     def scrub(
@@ -98,7 +98,9 @@ class UpkeepService:
                 found.damaged.append({"recording": recording_id, **vars(chunk)})
 
     def troubles(self) -> tuple[str, ...]:
-        """Return why nothing may be stored now: the file was exchanged, or the last check found it damaged."""
+        """Return the reasons why nothing may be stored now, a sentence each: the file was exchanged, or the last check
+        found it damaged.
+        """
         trouble = self._database.trouble()
         last = self._stores.upkeep.last(UpkeepKind.SCRUB) if trouble is None else None
         if last is None or not last.document.get("faults"):
@@ -106,7 +108,7 @@ class UpkeepService:
         return (f"the database is damaged ({sentence(last)}): restore a copy, `bench restore`",)
 
     def notes(self) -> tuple[str, ...]:
-        """Return what a person should know of the last check, where it found recordings damaged."""
+        """Return sentences about the last check where it found recordings damaged; empty where it did not."""
         last = self._stores.upkeep.last(UpkeepKind.SCRUB)
         if last is None or last.good or last.document.get("faults"):
             return ()
@@ -114,7 +116,7 @@ class UpkeepService:
 
 
 def sentence(report: UpkeepReport) -> str:
-    """Describe the outcome of a check in a sentence."""
+    """Return the outcome of a check of the database as one sentence."""
     document, at = report.document, report.began_at.isoformat(timespec="seconds")
     if report.good:
         return f"{document['recordings']} recordings, {document['stored_bytes']} bytes are as they were stored ({at})"
@@ -125,7 +127,7 @@ def sentence(report: UpkeepReport) -> str:
 
 
 class NightlyScrub:
-    """Runs the check of the database each night, in a thread that gives way to everything else."""
+    """Thread that runs the check of the database each night, and gives way to everything else."""
 
     def __init__(self, upkeep: UpkeepService, at: str, then: Callable[[Event], object] = lambda ending: None) -> None:
         """Set up with `at`, the time of day on this host's clock, "HH:MM"; empty: never.
@@ -139,12 +141,14 @@ class NightlyScrub:
         self._thread = Thread(target=self._run, name="nightly check", daemon=True)
 
     def begin(self) -> None:
-        """Begin to wait for the night."""
+        """Start the thread that waits for the night, where the settings name a time."""
         if self._at:
             self._thread.start()
 
     def end(self) -> None:
-        """End the thread; a check that is under way ends without a result after its present recording."""
+        """End the thread and wait for it; a check that is under way ends without a result after its present
+        recording.
+        """
         self._ending.set()
 
     def _run(self) -> None:

@@ -1,7 +1,7 @@
 """Analyses and drawings in separate processes, so that the one that drives a bench and answers a stop stays free.
 
-A few processes at a low priority. A refusal by the work is raised here as the same error; work that is cut off, because
-its process died, may be requested again.
+A few processes at a low priority, which end without work for a while. A refusal by the work is raised here as the same
+error; work that is cut off, because its process died, may be requested again.
 """
 
 import contextlib
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from threading import BoundedSemaphore, Lock, Thread
+from threading import BoundedSemaphore, Lock, Thread, Timer
 from typing import Any
 
 from bench_service.model.errors import Overloaded, ServiceError, StorageFailure
@@ -24,6 +24,8 @@ AT_ONCE = 2
 NICENESS = 10
 """Niceness of these processes: they give way to driving a bench and to answering requests."""
 
+IDLE_S = 300.0
+"""Time without work after which the processes end [s, real time]: a person who reads results asks again before that."""
 WAITING = 16
 """Maximum number of pieces of work under way or waiting; each holds a thread of the service."""
 
@@ -33,7 +35,9 @@ Run = Callable[[str, tuple[Any, ...]], str]
 
 @dataclass(frozen=True)
 class Refusal:
-    """An error on its way to another process: errors with arguments of their own cannot be pickled as they are."""
+    """An error in picklable parts, on its way to another process: errors with arguments of their own cannot be pickled
+    as they are.
+    """
 
     kind: type[Exception]
     arguments: tuple[Any, ...]
@@ -41,11 +45,11 @@ class Refusal:
 
     @classmethod
     def of(cls, error: Exception) -> "Refusal":
-        """Take an error apart into picklable fields."""
+        """Return the picklable parts of an error."""
         return cls(type(error), error.args, dict(vars(error)))
 
     def error(self) -> Exception:
-        """Rebuild the original error."""
+        """Return the original error, rebuilt from its parts."""
         made = self.kind.__new__(self.kind)
         made.args = self.arguments
         vars(made).update(self.fields)
@@ -56,7 +60,12 @@ class WorkProcesses:
     """Worker processes of one service, begun with the first piece of work. For any thread."""
 
     def __init__(
-        self, open_run: Callable[..., Run], *arguments: Any, at_once: int = AT_ONCE, waiting: int = WAITING
+        self,
+        open_run: Callable[..., Run],
+        *arguments: Any,
+        at_once: int = AT_ONCE,
+        waiting: int = WAITING,
+        idle_s: float = IDLE_S,
     ) -> None:
         """Set up with `open_run`, called with `arguments` in each new process: an importable module's function."""
         self._at_once = at_once
@@ -66,10 +75,20 @@ class WorkProcesses:
         self._mutex = Lock()
         self._places = BoundedSemaphore(waiting)
         self._pool: ProcessPoolExecutor | None = None
+        self._idle_s = idle_s
+        self._under_way = 0
+        self._timer: Timer | None = None
+
+    def begin(self) -> None:
+        """Begin the processes before the first piece of work is there; does not wait for them."""
+        with self._mutex:
+            if self._pool is None:
+                self._begun().submit(_nothing)
+                self._time_idleness()
 
     def result(self, name: str, *arguments: Any) -> str:
-        """Run a piece of work. Raises its errors, `StorageFailure` where it is cut off, and `Overloaded` where
-        too much work is waiting already.
+        """Run a piece of work in a process, wait for it, and return its text. Raises its errors, `StorageFailure` where
+        it is cut off, and `Overloaded` where too much work is waiting already.
         """
         if not self._places.acquire(blocking=False):
             raise Overloaded(f"{self._waiting} such requests are running or waiting already: try again later")
@@ -80,6 +99,7 @@ class WorkProcesses:
                 self._pool = None
             raise StorageFailure("the process that did this work ended before it had finished: try again") from broken
         finally:
+            self._over()
             self._places.release()
         if isinstance(found, Refusal):
             raise found.error()
@@ -89,6 +109,7 @@ class WorkProcesses:
         """End the worker processes; work that is under way is cut off."""
         with self._mutex:
             pool, self._pool = self._pool, None
+            self._cancel_timer()
         if pool is not None:
             processes = list(getattr(pool, "_processes", {}).values())
             for process in processes:
@@ -97,16 +118,47 @@ class WorkProcesses:
 
     def _submit(self, name: str, arguments: tuple[Any, ...]) -> "Future[str | Refusal]":
         with self._mutex:
-            if self._pool is None:
-                context = multiprocessing.get_context("spawn")
-                given = (self._open_run, self._arguments)
-                self._pool = ProcessPoolExecutor(self._at_once, context, _begin, given)
-            return self._pool.submit(_work, name, arguments)
+            self._under_way += 1
+            self._cancel_timer()
+            return self._begun().submit(_work, name, arguments)
+
+    def _begun(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")
+            given = (self._open_run, self._arguments)
+            self._pool = ProcessPoolExecutor(self._at_once, context, _begin, given)
+        return self._pool
+
+    def _over(self) -> None:
+        """Note the end of a piece of work; the last one begins the time without work."""
+        with self._mutex:
+            self._under_way -= 1
+            if self._under_way == 0 and self._pool is not None:
+                self._time_idleness()
+
+    def _time_idleness(self) -> None:
+        self._cancel_timer()
+        self._timer = Timer(self._idle_s, self._end_if_idle)
+        self._timer.daemon = True
+        self._timer.start()
+
+    def _cancel_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _end_if_idle(self) -> None:
+        with self._mutex:
+            if self._under_way:
+                return
+            pool, self._pool = self._pool, None
+        if pool is not None:
+            pool.shutdown()
 
 
 @dataclass(frozen=True)
 class WorkApart:
-    """The processes of a service: for analyses, and for printed reports."""
+    """The work processes of a service: those for analyses, and those for printed reports."""
 
     analyses: WorkProcesses
     printing: WorkProcesses
@@ -128,6 +180,10 @@ def begin_process() -> None:
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     Thread(target=_end_with_the_service, name="end with the service", daemon=True).start()
+
+
+def _nothing() -> None:
+    """No piece of work: a process begins for it."""
 
 
 def _work(name: str, arguments: tuple[Any, ...]) -> str | Refusal:

@@ -1,4 +1,4 @@
-"""A block of rows as a reader of files gives it on."""
+"""A block of rows that a reader of files passes on to the import."""
 
 from dataclasses import dataclass
 
@@ -24,5 +24,5 @@ class Block:
         return len(self.values)
 
     def part(self, start: int, stop: int) -> "Block":
-        """The rows start … stop − 1."""
+        """Return the block of the rows start … stop − 1."""
         return Block(None if self.stamps is None else self.stamps[start:stop], self.values[start:stop], self.stamp_s)

@@ -43,12 +43,14 @@ class Bounds:
 
 
 def quoted(text: str) -> str:
-    """Shorten a cell or a name for a message."""
+    """Return a cell or a name in quotes for a message, shortened where it is long."""
     return repr(text if len(text) <= SHOWN_CHARACTERS else text[: SHOWN_CHARACTERS - 1] + "…")
 
 
 def not_one_column(column: str, count: int, present: str) -> str:
-    """Say that no column, or more than one, has a name; `present`: the columns there are, as `listed` lists them."""
+    """Return the sentence that no column, or more than one, has a name; `present`: the columns that the file has, as
+    `listed` lists them.
+    """
     if count == 0:
         return f"has no column {quoted(column)}; the columns are {present}"
     way = f"{count} have this name: give the column by its number, from 0"
@@ -56,6 +58,6 @@ def not_one_column(column: str, count: int, present: str) -> str:
 
 
 def listed(names: list[str]) -> str:
-    """List column names for a message: the first few, and how many there are."""
+    """Return column names as text for a message: the first few, and how many there are."""
     shown = ", ".join(n if len(n) <= SHOWN_CHARACTERS else n[: SHOWN_CHARACTERS - 1] + "…" for n in names[:SHOWN_NAMES])
     return shown if len(names) <= SHOWN_NAMES else f"{shown}, … ({len(names)} columns)"

@@ -22,7 +22,7 @@ _SECOND = 1_000_000_000
 
 
 class NoClock(Exception):
-    """A text that is no clock time; `row` counts from 0 within the given texts."""
+    """Raised for a text that is no clock time; `row` counts from 0 within the given texts."""
 
     def __init__(self, row: int, text: str) -> None:
         super().__init__(text)
@@ -31,7 +31,7 @@ class NoClock(Exception):
 
 
 def nanoseconds(texts: Any, fraction: Fraction) -> NDArray[np.int64]:
-    """Convert an Arrow array of texts to times [ns], since midnight or, with a date, since 1970. Raises `NoClock`."""
+    """Return an Arrow array of texts as times [ns], since midnight or, with a date, since 1970. Raises `NoClock`."""
     if fraction == "decimal" and texts.null_count == 0:
         fast = _cast(texts)
         if fast is not None:

@@ -50,7 +50,9 @@ def is_columnar(stream: BinaryIO) -> bool:
 def columnar_columns(
     stream: BinaryIO, name: str, columns: Sequence[Column], description: ImportDescription, bounds: Bounds
 ) -> Iterator[Block]:
-    """The named columns, block by block, the time first where the description has one. Raises `UnreadableFile`."""
+    """Yield the named columns, block by block, the time first where the description has one. Raises
+    `UnreadableFile`.
+    """
     stream.seek(0)
     row = 0
     try:

@@ -15,7 +15,7 @@ from procedures.core.recording import Channel, RawArray
 
 
 class ContentHash:
-    """Content hash while samples arrive."""
+    """Running content hash of a recording, while its samples arrive."""
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float, dtype: SampleType) -> None:
         self._dtype = np.dtype(dtype).newbyteorder("<")
@@ -44,12 +44,12 @@ class ContentHash:
 
 
 def content_hash(channels: Sequence[Channel], rate_hz: float, samples: RawArray) -> str:
-    """Compute the hash of a recording held in memory."""
+    """Return the content hash of a recording held in memory, 64 hexadecimal digits."""
     return hash_of_blocks(channels, rate_hz, samples.dtype, [samples])
 
 
 def hash_of_blocks(channels: Sequence[Channel], rate_hz: float, dtype: SampleType, blocks: Iterable[RawArray]) -> str:
-    """Compute the hash of a recording that comes in blocks, shape (n, channels). Raises what `blocks` does."""
+    """Return the content hash of a recording that comes in blocks, shape (n, channels). Raises what `blocks` does."""
     whole = ContentHash(channels, rate_hz, dtype)
     for block in blocks:
         whole.update(block)

@@ -35,7 +35,9 @@ class _NotANumber(Exception):
 def text_columns(
     stream: BinaryIO, name: str, columns: Sequence[Column], description: ImportDescription, bounds: Bounds
 ) -> Iterator[Block]:
-    """Read the named columns, block by block, the time first where the description has one. Raises `UnreadableFile`."""
+    """Yield the named columns, block by block, the time first where the description has one. Raises
+    `UnreadableFile`.
+    """
     table = TextTable(stream, name, description, bounds)
     reader = _Reader(table, name, columns, description)
     for number, text in _pieces(table, description):

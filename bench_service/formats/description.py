@@ -70,7 +70,7 @@ class ImportedChannel(_Strict):
         return isinstance(self.quantity, Accumulated)
 
     def channel(self) -> Channel:
-        """The channel of the recording, in the unit that is stored."""
+        """Return the channel of the recording, in the unit that is stored."""
         if isinstance(self.quantity, Accumulated):
             return stored_channel(self.name, _INCREMENT_OF[self.quantity], self.unit, self.scale, 0.0)
         return stored_channel(self.name, self.quantity, self.unit, self.scale, self.offset)
@@ -94,7 +94,7 @@ class Rows(_Strict):
 
 
 class ImportDescription(_Strict):
-    """All that must be known to read files as one recording of a unit."""
+    """A person's description of files: all that must be known to read them as one recording of a unit."""
 
     unit: str = Field(pattern=SERIAL, description="serial of the unit")
     channels: tuple[ImportedChannel, ...] = Field(min_length=1, max_length=64)
@@ -151,13 +151,13 @@ class ImportDescription(_Strict):
         return self
 
     def columns_of(self, file: int) -> tuple[Column, ...]:
-        """List the columns that are read from a file, the time first where there is one."""
+        """Return the columns that are read from a file, the time first where there is one."""
         time: tuple[Column, ...] = () if self.time_column is None else (self.time_column,)
         return (*time, *(c.source_column for c in self.channels if c.file == file))
 
     @property
     def time_scale_s(self) -> float:
-        """Seconds in one unit of the time column; text of a clock is read in nanoseconds."""
+        """Number of seconds in one unit of the time column; text of a clock is read in nanoseconds."""
         return TICKS.get(self.time_unit, 1e-9)
 
     def declared(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from procedures.core.errors import DomainError
 
 
 class UnreadableFile(DomainError):
-    """A file that does not match its description."""
+    """Raised for a file that does not match its description; names the file, the line or row, and what was expected."""
 
     def __init__(self, name: str, problem: str) -> None:
         super().__init__(f"{name}: {problem}")

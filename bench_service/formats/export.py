@@ -2,7 +2,7 @@
 
 Samples go out as they are stored, raw; scale, offset, unit and quantity of each channel, the rate and the content hash
 of the whole recording travel with them (not in NumPy's format, which has no place for them).
-``value = scale·(raw − offset)``. Must not know where the blocks come from.
+``value = scale·(raw − offset)``. Must not know where the blocks come from. Arrow is imported where something goes out.
 """
 
 import io
@@ -13,11 +13,8 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from pyarrow import csv
 
-from bench_service.formats.chunk import RAW_BYTES, sample_type
+from bench_service.formats.chunk import RAW_BYTES, arrow_array, sample_type
 from bench_service.formats.outbox import Outbox
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
@@ -65,7 +62,8 @@ def extract(
     start_s: float | None = None,
     stop_s: float | None = None,
 ) -> Extract:
-    """Select a part by names and by time since the first sample [s]; a sample belongs to its beginning.
+    """Return a part of a recording, by names of channels and by time since its first sample [s]; a sample belongs to
+    its beginning.
 
     Raises `MissingChannel`, `BadParameter`.
     """
@@ -117,7 +115,7 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
 
 
 def describe(part: Extract) -> dict[str, str]:
-    """Describe the recording for the reader of the file, as text."""
+    """Return the description of the recording for the reader of the file, as name -> text."""
     info = part.info
     return {
         "recording": info.id,
@@ -133,6 +131,8 @@ def describe(part: Extract) -> dict[str, str]:
 
 
 def _schema(part: Extract) -> Any:
+    import pyarrow as pa
+
     kind = pa.from_numpy_dtype(sample_type(part.dtype))
     fields = [
         pa.field(
@@ -152,12 +152,16 @@ def _schema(part: Extract) -> Any:
 
 
 def _batches(schema: Any, blocks: Iterable[RawArray]) -> Iterator[Any]:
+    import pyarrow as pa
+
     for block in blocks:
-        columns = [pa.array(np.ascontiguousarray(block[:, index])) for index in range(block.shape[1])]
+        columns = [arrow_array(block[:, index]) for index in range(block.shape[1])]
         yield pa.RecordBatch.from_arrays(columns, schema=schema)
 
 
 def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
+    import pyarrow as pa
+
     outbox, schema = Outbox(), _schema(part)
     with pa.ipc.new_stream(pa.PythonFile(outbox, mode="w"), schema) as writer:
         for batch in _batches(schema, blocks):
@@ -167,6 +171,9 @@ def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
 
 
 def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     outbox, schema = Outbox(), _schema(part)
     with pq.ParquetWriter(
         pa.PythonFile(outbox, mode="w"),
@@ -185,6 +192,9 @@ def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
 
 def _csv(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
     """Lines that begin with "#" describe; then names; then rows: time since the first sample [s], raw samples."""
+    import pyarrow as pa
+    from pyarrow import csv
+
     lines = [f"# {key}: {value}" for key, value in describe(part).items()]
     lines += [
         f"# channel {c.name}: quantity={c.quantity.value} unit={c.unit} scale={c.scale!r} offset={c.offset!r}"
@@ -196,7 +206,7 @@ def _csv(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
     sample = part.start
     for block in blocks:
         time_s = np.arange(sample, sample + len(block)) / part.info.rate_hz
-        columns = [pa.array(time_s), *(pa.array(np.ascontiguousarray(block[:, i])) for i in range(len(names)))]
+        columns = [arrow_array(time_s), *(arrow_array(block[:, i]) for i in range(len(names)))]
         sink = pa.BufferOutputStream()
         csv.write_csv(pa.Table.from_arrays(columns, names=["time_s", *names]), sink, options)
         yield sink.getvalue().to_pybytes()

@@ -1,5 +1,7 @@
 """Detection of other file types by their first bytes, each with the way to a readable table."""
 
+import struct
+
 _SAVE = "save it as CSV, Parquet or Arrow"
 _AS_IT_IS = 'it is read as it is, not packed by gzip and without format = "table"'
 _KINDS: tuple[tuple[bytes, str], ...] = (
@@ -27,7 +29,23 @@ _KINDS: tuple[tuple[bytes, str], ...] = (
 )
 
 
+_MATLAB_4 = "a MATLAB file of version 4: in MATLAB or Octave save it again (save -v7)"
+_TYPES_4 = {1000 * machine + 10 * number + text for machine in range(5) for number in range(6) for text in range(3)}
+
+
+def _is_matlab_4(start: bytes) -> bool:
+    """Return whether a file begins with the five numbers of a matrix of version 4 and its name."""
+    if len(start) < 22:
+        return False
+    kind, rows, columns, is_complex, length = struct.unpack(">5I" if start[0] == 0 and start[3] else "<5I", start[:20])
+    name = start[20 : 19 + length]
+    sized = rows > 0 and columns > 0 and is_complex in (0, 1) and 1 < length <= 64
+    return kind in _TYPES_4 and sized and name.replace(b"_", b"a").isalnum()
+
+
 def foreign_kind(start: bytes) -> str | None:
-    """The kind of a file that begins so, and the way out; None: it may be text."""
+    """Return the kind of a file that begins so, and the way to a readable table; None: it may be text."""
+    if _is_matlab_4(start):
+        return _MATLAB_4
     begin = start.lstrip(b" \t\r\n") if start[:1] in b" \t\r\n" else start
     return next((words for magic, words in _KINDS if begin.startswith(magic)), None)

@@ -27,7 +27,7 @@ _NO_ROWS = np.empty(0, np.int64)
 
 @dataclass(frozen=True)
 class ImportedRecording:
-    """Files that were checked and fit together: what a recording of them is, and its samples."""
+    """Files that were checked and fit together: the recording that they give, and its samples."""
 
     description: ImportDescription
     channels: tuple[Channel, ...]
@@ -41,7 +41,7 @@ class ImportedRecording:
     _bounds: Bounds = field(repr=False)
 
     def blocks(self) -> Iterator[RawArray]:
-        """The samples in order, each block (n, channels)."""
+        """Yield the samples in order, each block (n, channels); reads the files a second time."""
         clock = self._clock
         gone = (_NO_ROWS, _NO_ROWS, _NO_ROWS) if clock is None else (clock.repeats, clock.gaps, clock.lost)
         rebuild = Rebuild(self.description.channels, *gone)
@@ -51,7 +51,9 @@ class ImportedRecording:
 
 
 def read_import(files: Sequence[ImportFile], description: ImportDescription) -> ImportedRecording:
-    """Check files against their description. Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`."""
+    """Check files against their description, all rows, and return the recording that they give. Raises
+    `UnreadableFile`, `UnfitRecording`, `BadParameter`.
+    """
     used = {channel.file for channel in description.channels}
     if used != set(range(len(files))):
         raise BadParameter("channels.file", sorted(used), f"every one of the {len(files)} files, numbered from 0")

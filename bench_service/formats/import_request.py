@@ -1,4 +1,4 @@
-"""The two sides of an import: a file to read, and what was found in it. Loads no reader."""
+"""Values on both sides of an import: a file to read, and what was found in it. Loads no reader."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ class ImportFile:
 
 
 class Imported(Protocol):
-    """Files that were checked and fit together, whichever process reads them."""
+    """Files that were checked and fit together, whichever process reads them. Interface."""
 
     @property
     def description(self) -> ImportDescription: ...
@@ -36,9 +36,9 @@ class Imported(Protocol):
     def dtype(self) -> type[np.int32] | type[np.float64]: ...
     @property
     def source(self) -> dict[str, Any]:
-        """File names, their SHA-256, the description, the findings: to be kept with the recording."""
+        """File names, their SHA-256, the description, the findings, as JSON: stored with the recording."""
         ...
 
     def blocks(self) -> Iterator[RawArray]:
-        """The samples in order, each block (n, channels)."""
+        """Yield the samples in order, each block (n, channels)."""
         ...

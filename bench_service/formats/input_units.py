@@ -72,8 +72,13 @@ _SPELLINGS = {
 
 
 def spelled(unit: str) -> str:
-    """The one spelling of a unit that is used here."""
+    """Return a unit in the one spelling that is used here; an unknown one as it is."""
     return _SPELLINGS.get(unit, unit)
+
+
+def every_unit() -> set[str]:
+    """Return all units of all quantities, in every spelling."""
+    return {unit for sizes in _SIZES.values() for unit in sizes} | set(_SPELLINGS)
 
 
 def allowed_units(quantity: Quantity) -> tuple[str, ...]:
@@ -82,7 +87,7 @@ def allowed_units(quantity: Quantity) -> tuple[str, ...]:
 
 
 def stored_channel(name: str, quantity: Quantity, unit: str, scale: float, offset: float) -> Channel:
-    """Convert a column's channel, ``scale·(raw − offset)`` in `unit`, to the unit that is stored.
+    """Return a column's channel, ``scale·(raw − offset)`` in `unit`, converted to the unit that is stored.
 
     Raises `ValueError` for a unit that the quantity does not have, and for a scale of zero.
     """

@@ -22,19 +22,21 @@ from procedures.core.arrays import Array
 
 @dataclass(frozen=True)
 class Opened:
-    """A file and, where it is a log, its opened reader."""
+    """A file, and where it is a log its opened reader."""
 
     file: ImportFile
     log: Log | None
 
 
 def opened_files(files: Sequence[ImportFile], form: str | None) -> tuple[Opened, ...]:
-    """Open files by their formats, or by the one that is asked for. Raises `UnreadableFile`, `BadParameter`."""
+    """Open files by their formats, or by the format `form`, and return them. Raises `UnreadableFile`,
+    `BadParameter`.
+    """
     return tuple(Opened(file, opened_log(file.stream, file.name, form)) for file in files)
 
 
 def surveyed(opened: Sequence[Opened], description: ImportDescription, bounds: Bounds) -> Findings:
-    """Look at all rows once. Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`."""
+    """Read all rows once and return the findings. Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`."""
     with closing(Survey([o.file.name for o in opened], description, bounds)) as survey:
         for parts in joined(opened, description, bounds):
             survey.add(parts, in_order(parts, description))
@@ -42,7 +44,7 @@ def surveyed(opened: Sequence[Opened], description: ImportDescription, bounds: B
 
 
 def in_order(parts: Sequence[Block], description: ImportDescription) -> Array:
-    """The channels' columns out of the files' blocks, in the order of the channels, (n, channels)."""
+    """Return the channels' columns out of the files' blocks, in the order of the channels, (n, channels)."""
     if len(parts) == 1:
         return parts[0].values
     next_column = [0] * len(parts)
@@ -54,7 +56,9 @@ def in_order(parts: Sequence[Block], description: ImportDescription) -> Array:
 
 
 def joined(files: Sequence[Opened], description: ImportDescription, bounds: Bounds) -> Iterator[list[Block]]:
-    """Blocks of all files side by side, with equal numbers of rows. Raises `UnreadableFile`."""
+    """Yield the blocks of all files side by side, with equal numbers of rows. Raises `UnreadableFile` where one has
+    fewer.
+    """
     readers = [_columns(file, index, description, bounds) for index, file in enumerate(files)]
     waiting = [next(reader, None) for reader in readers]
     rows = 0

@@ -1,8 +1,8 @@
-"""File object that hands out the bytes written to it, for writers of files that are streamed."""
+"""Write-only file object for writers whose files are streamed while they are written."""
 
 
 class Outbox:
-    """Bytes that were written and not yet taken. It cannot seek, and says so."""
+    """Write-only file object: collects bytes until they are taken; not seekable."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -10,7 +10,7 @@ class Outbox:
         self.closed = False
 
     def write(self, data: bytes) -> int:
-        """Append bytes."""
+        """Append bytes; return their number."""
         self._pieces.append(bytes(data))
         self._position += len(data)
         return len(data)
@@ -23,11 +23,11 @@ class Outbox:
         self.closed = True
 
     def seekable(self) -> bool:
-        """Answer that there is no seeking."""
+        """Return False: there is no seeking."""
         return False
 
     def take(self) -> bytes:
-        """The bytes since the last call."""
+        """Return the bytes that were written since the last call, and forget them."""
         taken = b"".join(self._pieces)
         self._pieces.clear()
         return taken

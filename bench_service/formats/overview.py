@@ -26,7 +26,7 @@ class Overview:
 
 
 def overview(part: Extract, blocks: Iterable[RawArray], bins: int) -> Overview:
-    """Make the overview of a part from its samples, in order, each block (n, channels), in at most `bins` bins.
+    """Return the overview of a part from its samples, in order, each block (n, channels), in at most `bins` bins.
 
     Bin k holds the samples from ⌊k·n/bins⌋ on, so all hold the same number of samples but for one.
     """

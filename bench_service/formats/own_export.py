@@ -1,4 +1,4 @@
-"""Our own exports, recognised by what they say of themselves: a recording comes back as it was."""
+"""Recognition of this service's own exports by their metadata, so that a recording can be imported as it was."""
 
 import re
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ MARKS = ("recording", "unit", "rate_hz", "simulated", "content_hash_of_whole_rec
 
 @dataclass(frozen=True)
 class OwnExport:
-    """The description that an export of ours carries."""
+    """Description that an exported file of this service carries in itself."""
 
     facts: dict[str, str]
     channels: tuple[dict[str, Any], ...]
@@ -26,16 +26,16 @@ class OwnExport:
 
     @property
     def simulated(self) -> bool:
-        """Return whether the recording was simulated."""
+        """True where the recording was simulated."""
         return self.facts.get("simulated") == "true"
 
     @property
     def is_whole(self) -> bool:
-        """Return whether the export begins with the recording's first sample."""
+        """True where the export begins with the recording's first sample."""
         return self.facts.get("first_sample") == "0"
 
     def description(self) -> dict[str, Any]:
-        """Return the description that brings the recording back as it was."""
+        """Return the import description, as JSON, that brings the recording back as it was."""
         found: dict[str, Any] = {
             "unit": self.facts["unit"],
             "channels": list(self.channels),
@@ -47,7 +47,9 @@ class OwnExport:
 
 
 def own_export(stream: BinaryIO) -> OwnExport | None:
-    """Recognise an export of ours; None: the file is none. Its place in the stream is the beginning afterwards."""
+    """Return the description in an export of this service; None: the file is none. The stream is at its beginning
+    afterwards.
+    """
     try:
         found = _columnar(stream) if is_columnar(stream) else _text(stream)
     except (pa.ArrowException, OSError, UnicodeDecodeError, ValueError, KeyError):

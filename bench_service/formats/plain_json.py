@@ -41,12 +41,12 @@ def is_finite(number: float) -> bool:
 
 
 def shown(text: str) -> str:
-    """Escape the characters of a text that some store or client cannot hold."""
+    """Return a text with the characters escaped that some store or client cannot hold."""
     return _UNFIT.sub(lambda found: f"\\u{ord(found.group()):04x}", text)
 
 
 def faults(document: Any) -> Iterator[Fault]:
-    """Find the values that break the rule in a document that `json.loads` made, in its order."""
+    """Yield the values that break the rule in a document that `json.loads` made, in its order."""
     if isinstance(document, _NESTING):
         yield from _faults_within(document, ())
     elif (allowed := _instead_of(document)) is not None:
@@ -74,14 +74,16 @@ def _instead_of(scalar: Any) -> str | None:
 
 
 def read_back(stored: str | bytes) -> Any:
-    """Parse a stored document. Values that an older version let in against the rule are given as their escapes."""
+    """Return a stored document, parsed. Values that an older version let in against the rule are given as their
+    escapes.
+    """
     text = stored if isinstance(stored, str) else stored.decode()
     found = json.loads(text)
     return mended(found) if _ESCAPED.search(text) else found
 
 
 def mended(node: Any, room: int = 2 * DEPTH) -> Any:
-    """Escape each text of a document, and cut branches that are nested too deeply for any answer.
+    """Return a document with its texts escaped, and branches cut that are nested too deeply for any answer.
 
     `room`: levels; more than the rule's, as the service nests the documents that clients sent in its own.
     """

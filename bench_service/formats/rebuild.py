@@ -13,7 +13,7 @@ _AT_ONCE = 262_144
 
 
 class Increments:
-    """Steps of the channels that are accumulated, from row to row; the first row of all has none and is NaN there."""
+    """Running differences of accumulated channels, from row to row; the first row of all has none and is NaN there."""
 
     def __init__(self, channels: Sequence[ImportedChannel]) -> None:
         self.columns = [i for i, c in enumerate(channels) if c.is_accumulated]
@@ -21,7 +21,7 @@ class Increments:
         self._last: Array | None = None
 
     def steps(self, values: Array) -> Array:
-        """The rows (n, channels) with steps in the place of accumulated values."""
+        """Return the rows (n, channels) with differences in the place of accumulated values."""
         if not self.columns or not len(values):
             return values
         before = np.full((1, values.shape[1]), np.nan) if self._last is None else self._last
@@ -35,7 +35,7 @@ class Increments:
 
 
 class Rebuild:
-    """Rows as they are read become the rows of the recording.
+    """Makes the rows of a recording from rows as they are read.
 
     `repeats` are left out; `lost` rows of NaN follow each of `gaps`; all rows are counted from 0 as they are read.
     """
@@ -53,7 +53,7 @@ class Rebuild:
         self._begun = False
 
     def rows(self, values: Array) -> Iterator[Array]:
-        """The recording's rows made of the next ones, (n, channels)."""
+        """Yield the recording's rows made of the next ones, (n, channels)."""
         for block in self._whole(values):
             stepped = self._increments.steps(block)
             if self._increments.columns and not self._begun and len(stepped):

@@ -1,4 +1,4 @@
-"""First pass over imported files: the facts about all samples that are needed before the first is stored."""
+"""First pass over imported files: finds rate, count and gaps, and refuses faults, before the first sample is stored."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _INT32 = np.iinfo(np.int32)
 
 @dataclass(frozen=True)
 class Findings:
-    """Findings of the first pass over all files."""
+    """Findings of the first pass over all files: rate, count, type of samples, clock, warnings."""
 
     rate_hz: float
     count: int
@@ -34,7 +34,7 @@ class Findings:
 
 
 class Survey:
-    """Checks rows of all files as they are read."""
+    """First pass over imported files: checks rows of all files as they are read."""
 
     def __init__(self, names: Sequence[str], description: ImportDescription, bounds: Bounds) -> None:
         self._names = names
@@ -49,12 +49,14 @@ class Survey:
         self._outside: str | None = None
 
     def close(self) -> None:
-        """Free the memory of the time column."""
+        """Free the memory of the time column; no finding is possible afterwards."""
         if self._clock is not None:
             self._clock.close()
 
     def add(self, parts: Sequence[Block], values: Array) -> None:
-        """Check the next rows of every file, and their channels in order, (n, channels)."""
+        """Check the next rows of every file, and their channels in order, (n, channels). Raises `UnreadableFile`,
+        `UnfitRecording`.
+        """
         self._require_room(self._count + len(values))
         self._add_stamps(parts, values)
         self._last = values[-1:].copy()
@@ -125,7 +127,7 @@ class Survey:
             )
 
     def findings(self) -> Findings:
-        """Findings of all rows together. Raises `BadParameter`, `UnreadableFile`, `UnfitRecording`."""
+        """Return the findings of all rows together. Raises `BadParameter`, `UnreadableFile`, `UnfitRecording`."""
         description = self._description
         if not self._count:
             first = description.rows.first

@@ -25,7 +25,9 @@ def first_fault(
     indices: Sequence[int],
     description: ImportDescription,
 ) -> str | None:
-    """Describe the fault in the first bad line of a piece; `first_line` numbers its first line; None: none is found."""
+    """Return the fault in the first bad line of a piece as a sentence; `first_line` numbers its first line; None: none
+    is found. Raises `UnreadableFile` for a line without an end.
+    """
     for number, line in enumerate(text.splitlines(keepends=True), first_line):
         if len(line) > LINE_BYTES:
             raise too_long(table.name, number)

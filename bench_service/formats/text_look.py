@@ -1,17 +1,21 @@
-"""A look at the beginning of a delimited text: its delimiter, the line of names, the decimal mark."""
+"""Recognition of a delimited text by its beginning: its delimiter, the line of names, the decimal mark."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import BinaryIO
 
 from bench_service.formats.bounds import LINE_BYTES, Bounds
 from bench_service.formats.description import DELIMITERS
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.text_source import TextSource
+from bench_service.formats.input_units import every_unit, spelled
+from bench_service.formats.text_source import TextSource, text_of
 
 LOOKED_AT = 300
 """Number of lines from which a table is recognised."""
 _CLOCK = re.compile(rb"^\d{1,4}[-/:]\d\d?[-/:]\d\d.*$")
+_UNITS = {*every_unit(), "s", "sec", "ms", "us", "µs", "ns", "rad/sec", "deg/sec", "degree/s", "degc", "m/s/s", "-"}
+"""Cells of a line of units below the names."""
 _MISSING = (b"", b"nan", b"na", b"null", b"none")
 
 
@@ -25,6 +29,8 @@ class TextLook:
     """Lines before the names, or before the data where there are no names."""
     names: tuple[str, ...] | None
     """Names of the columns; None: the text has none."""
+    units: tuple[str, ...] | None
+    """Units of the columns where they have a line of their own below the names, which `header_lines` counts too."""
     width: int
     preamble: tuple[str, ...]
     """The lines before the table."""
@@ -33,7 +39,7 @@ class TextLook:
 
 
 def look(stream: BinaryIO, name: str) -> TextLook:
-    """Recognise the table in a text. Raises `UnreadableFile` where there is none."""
+    """Return the form of the table in a text, by its beginning. Raises `UnreadableFile` where there is none."""
     source = TextSource(stream, name, Bounds().unpacked_bytes)
     source.fill(LINE_BYTES)
     lines = source.glance().split(b"\n")[: LOOKED_AT + 1]
@@ -53,16 +59,39 @@ def look(stream: BinaryIO, name: str) -> TextLook:
     _, begin = _longest(lines, delimiter, decimal)
     names_at = _names_at(lines, begin, delimiter, width)
     head = begin if names_at is None else names_at
-    names = None if names_at is None else tuple(_named(lines[names_at], delimiter))
+    names = None if names_at is None else _wide(_named(lines[names_at], delimiter), width)
+    units = None
+    if names is not None and names_at is not None and _are_units(names):
+        above = _names_at(lines, names_at, delimiter, width)
+        if above is not None:
+            units, names, head = _bare_units(names), _wide(_named(lines[above], delimiter), width), names_at + 1
     return TextLook(
         delimiter,
         decimal,
         head,
         names,
+        units,
         width,
-        tuple(line.decode("utf-8", "replace") for line in lines[:head]),
-        tuple(cell.decode("utf-8", "replace").strip() for cell in _cells(lines[begin], delimiter)),
+        tuple(text_of(line) for line in lines[:head]),
+        tuple(text_of(cell).strip() for cell in _cells(lines[begin], delimiter)),
     )
+
+
+def _wide(names: list[str], width: int) -> tuple[str, ...]:
+    """Give a line of names the width of its table: the last name may be missing, where lines end with a delimiter."""
+    return tuple([*names, *[""] * width][:width])
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Return whether a line above the data holds units, not names: most of its cells are units."""
+    filled = [cell for cell in _bare_units(cells) if cell.strip("-")]
+    known = sum(cell.lower() in _UNITS or spelled(cell) in _UNITS for cell in filled)
+    return known > 1 and known > 0.6 * len(filled)
+
+
+def _bare_units(cells: Sequence[str]) -> tuple[str, ...]:
+    """Take units out of their brackets."""
+    return tuple(cell.strip("[](){} ") for cell in cells)
 
 
 def _longest(lines: list[bytes], delimiter: str, decimal: str) -> tuple[int, int]:
@@ -111,11 +140,7 @@ def _cells(line: bytes, delimiter: str) -> list[bytes]:
 
 
 def _named(line: bytes, delimiter: str) -> list[str]:
-    bare = (
-        line.decode("utf-8-sig", "replace").lstrip("#% \t")
-        if line[:1] in (b"#", b"%")
-        else line.decode("utf-8-sig", "replace")
-    )
+    bare = text_of(line).lstrip("#% \t") if line[:1] in (b"#", b"%") else text_of(line)
     cells = bare.split() if delimiter == "whitespace" else bare.split(DELIMITERS[delimiter].decode())
     return [cell.strip().strip('"').strip() for cell in cells]
 

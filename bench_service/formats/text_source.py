@@ -19,7 +19,7 @@ GLANCE_BYTES = 64 * 1024
 
 
 class TextSource:
-    """A text from its beginning. `unpacked_bytes` is the most that is unpacked."""
+    """Reader of one text from its beginning, unpacked and decoded. `unpacked_bytes` is the most that is unpacked."""
 
     def __init__(self, stream: BinaryIO, name: str, unpacked_bytes: int) -> None:
         self._name = name
@@ -84,7 +84,7 @@ class TextSource:
         return text.replace(b"\r", b"\n") if self._cr else text
 
     def fill(self, size: int) -> None:
-        """Buffer at least `size` bytes, or all that there are."""
+        """Read on until at least `size` bytes are buffered, or all that there are."""
         parts, have = [self._buffer], len(self._buffer)
         while have < size and not self._ended:
             part = self._lines(self._decoded(self._read(PIECE_BYTES)))
@@ -98,7 +98,7 @@ class TextSource:
 
     @property
     def is_over(self) -> bool:
-        """Return whether all remaining text is in memory."""
+        """True where all remaining text is in memory."""
         return self._ended
 
     def line(self, number: int) -> bytes:
@@ -122,8 +122,16 @@ class TextSource:
         return taken
 
 
+def text_of(data: bytes) -> str:
+    """Decode some of a text: UTF-8 with or without a mark, or else the code page 1252 of Western Windows."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
 def too_long(name: str, number: int) -> UnreadableFile:
-    """Build the refusal of a line without an end."""
+    """Return the error to raise for a line without an end."""
     return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is not a table of text")
 
 

@@ -13,7 +13,7 @@ from typing import BinaryIO
 from bench_service.formats.bounds import COLUMNS, LINE_BYTES, Bounds, listed, not_one_column, quoted
 from bench_service.formats.description import DELIMITERS, Column, ImportDescription
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.text_source import TextSource, too_long
+from bench_service.formats.text_source import TextSource, text_of, too_long
 
 SAMPLE_LINES = 200
 MARKERS = "#%"
@@ -21,7 +21,7 @@ MARKERS = "#%"
 
 
 class TextTable:
-    """The text after the lines that are no data, with the names of its columns."""
+    """Table of a delimited text after its head: its column names, its delimiter, the width of its lines."""
 
     def __init__(self, stream: BinaryIO, name: str, description: ImportDescription, bounds: Bounds) -> None:
         self.name = name
@@ -38,7 +38,7 @@ class TextTable:
             raise UnreadableFile(name, f"has {self.width} columns, at most {COLUMNS} are read")
 
     def cells(self, line: bytes) -> list[bytes]:
-        """Split a line into its cells, quotes kept."""
+        """Return the cells of a line, quotes kept."""
         bare = line.rstrip(b"\r\n")
         if self._delimiter == b" ":
             return bare.split()
@@ -127,6 +127,8 @@ class TextTable:
             names.append("")
         if len(names) == self.width + 1 and not names[-1]:
             names.pop()
+        if len(names) == self.width + 1 and not names[0].strip(MARKERS):
+            names.pop(0)  # the mark of a comment, apart from the names by a blank
         if len(names) == self.width:
             return
         if len(data) < 2 and len(names) > 1:  # a single line is no law
@@ -144,7 +146,9 @@ class TextTable:
         )
 
     def indices(self, columns: Sequence[Column]) -> list[int]:
-        """Find the indices of the columns. Raises `UnreadableFile`."""
+        """Return the indices of the columns, from 0. Raises `UnreadableFile` for a column that the file does not
+        have.
+        """
         present = listed(self.names) if self.names else "0" if self.width == 1 else f"0 … {self.width - 1}"
         found: list[int] = []
         for column in columns:
@@ -198,11 +202,7 @@ def _usual_width(rows: Sequence[list[bytes]], preferred: int) -> int:
 
 
 def _name(cell: bytes) -> str:
-    try:
-        text = cell.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = cell.decode("cp1252", errors="replace")
-    return text.strip().strip('"').strip()
+    return text_of(cell).strip().strip('"').strip()
 
 
 def _same(name: str, wanted: str) -> bool:

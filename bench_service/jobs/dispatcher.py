@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Unfinished:
-    """The engine's state of a running job's workflow. Neither field set: it never began."""
+    """State of a running job's workflow in the job engine. Neither field set: it never began."""
 
     alive: bool = False
     """True where the engine resumes the workflow."""
@@ -47,27 +47,29 @@ class Unfinished:
 
 
 class JobEngine(Protocol):
-    """The part of `bench_service.jobs.engine.Engine` that the dispatcher uses."""
+    """The part of `bench_service.jobs.engine.Engine` that the dispatcher uses. Interface."""
 
     def launch(self) -> None:
         """Start working on jobs; unfinished jobs of a dead process resume. The bench's lease must be held."""
         ...
 
     def run(self, job: Job) -> None:
-        """Run a claimed job to its end. Raises `ShuttingDown`, and any failure that keeps it from running."""
+        """Run a claimed job, and block until it has ended. Raises `ShuttingDown`, and any failure that keeps it from
+        running.
+        """
         ...
 
     def unfinished(self, job: QueueEntry) -> Unfinished:
-        """The state of a running job's workflow."""
+        """Return the state of a running job's workflow, for a job that another process left."""
         ...
 
     def shut_down(self) -> None:
-        """Stop working, once the running job has left the bench safe; it resumes after the next start."""
+        """Stop working, and wait until the running job has left the bench safe; it resumes after the next start."""
         ...
 
 
 class Dispatcher:
-    """Runs the jobs of one bench, one after the other, in a thread of its own."""
+    """Claims the jobs of one bench from its queue and runs them one after the other, in a thread of its own."""
 
     def __init__(
         self,
@@ -101,11 +103,11 @@ class Dispatcher:
         self._thread = Thread(target=self._run, name=f"dispatcher {bench_id}", daemon=True)
 
     def begin(self) -> None:
-        """Begin to dispatch jobs. The engine must be launched."""
+        """Start the thread that claims and runs jobs. The engine must be launched."""
         self._thread.start()
 
     def wake(self) -> None:
-        """Look at the bench's queue now, and at the lease of manual mode that runs."""
+        """Have the thread look at the bench's queue now, and at the lease of manual mode that runs. Never waits."""
         if self._manual is not None:
             self._manual.wake()
         self._wake.set()
@@ -119,7 +121,7 @@ class Dispatcher:
         return self._lease.held()
 
     def shut_down(self) -> None:
-        """Claim no more jobs, and end manual mode. The engine ends the running job."""
+        """Claim no more jobs, and end manual mode, waiting until its bench is safe. The engine ends the running job."""
         self._ending.set()
         self._wake.set()
         if self._manual is not None:

@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 
 
 class JsonSerializer(Serializer):
-    """Step outputs as JSON: a database that can be read, and no pickle in it."""
+    """Serializer of the outputs of steps as JSON for DBOS: a database that can be read, and no pickle in it."""
 
     def serialize(self, data: Any) -> str:
         if isinstance(data, Exception):
@@ -125,13 +125,17 @@ class Engine:
             raise self._understood(error) from error
 
     def run(self, job: Job) -> None:
-        """Run a claimed job to its end. Raises `ShuttingDown`, or the error that kept its workflow unwritten."""
+        """Run a claimed job as a workflow, and block until it has ended. Raises `ShuttingDown`, or the error that kept
+        its workflow unwritten.
+        """
         with SetWorkflowID(_workflow_id(job), workflow_id_reuse_policy="reject"):
             handle = DBOS.start_workflow(self._workflow, job.id, job.attempt)
         handle.get_result()
 
     def unfinished(self, job: QueueEntry) -> Unfinished:
-        """The state of a running job's workflow."""
+        """Return the state of a running job's workflow; one of another version of the service is cancelled, and counts
+        as gone.
+        """
         status = DBOS.get_workflow_status(_workflow_id(job))
         if status is None:
             return Unfinished()
@@ -145,7 +149,7 @@ class Engine:
         return Unfinished(gone=Failure("EngineGaveUp", f"the job engine ended this job as {status.status}"))
 
     def shut_down(self) -> None:
-        """Stop working, once the running job has left the bench safe; it resumes after the next start."""
+        """Stop working, and wait until the running job has left the bench safe; it resumes after the next start."""
         self._ending.set()
         if self._one_at_a_time.acquire(timeout=self._ending_s):
             self._one_at_a_time.release()

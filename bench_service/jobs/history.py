@@ -1,4 +1,4 @@
-"""The history that a database should have: devices that were driven before know of more than an empty database."""
+"""Detection of a lost database: devices that were driven before should have jobs in it."""
 
 from bench_service.bench.devices import DeviceState
 from bench_service.jobs.stores import JobStore

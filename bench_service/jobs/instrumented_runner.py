@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 
 
 class InstrumentedRunner(JobRunner):
-    """A `JobRunner` that logs and traces its steps."""
+    """A `JobRunner` that writes a log line and a span of the job's trace for each step."""
 
     def __init__(
         self,

@@ -5,6 +5,6 @@ from bench_service.model.job import job_number
 
 
 def job_id_of(stores: JobStores, text: str) -> str:
-    """Return the id of a job that is named by its id or its number. Raises `NotFound` for a number of none."""
+    """Return the id of a job that is named by its id or its number. Raises `NotFound` for a number that no job has."""
     number = job_number(text)
     return text if number is None else stores.jobs.id_of(number)

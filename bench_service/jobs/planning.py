@@ -1,4 +1,4 @@
-"""Turns a request into a plan: parameters complete, stations laid out, worth predicted, before anything moves."""
+"""Turns a request into a plan before anything moves: complete parameters, stations, and the predicted uncertainty."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -26,7 +26,9 @@ TEMPERATURE_CHANNELS = 7
 
 @dataclass(frozen=True)
 class Plan:
-    """A procedure with all that its run needs."""
+    """A job that is planned in full: procedure, complete parameters, context, stations, prediction, size of its data,
+    violated limits.
+    """
 
     procedure: AnyProcedure
     parameters: Parameters
@@ -38,7 +40,9 @@ class Plan:
 
 
 class Planner:
-    """Plans jobs from the catalogue of procedures on the known benches."""
+    """Makes plans of jobs, from the catalogue of procedures, the known benches and the stored units. Changes
+    nothing.
+    """
 
     def __init__(
         self, units: UnitStore, benches: BenchDirectory, catalogue: Catalogue, mountings: MountingStore | None = None
@@ -50,7 +54,8 @@ class Planner:
         self._mountings = mountings
 
     def context(self, unit: str, bench: str | None = None, mounting: str | None = None) -> Context:
-        """The current unit, bench and mounting. Raises `NotFound` for an unknown bench, `NotMounted` for its unit.
+        """Return the unit with its current data, the bench and the mounting. Raises `NotFound` for an unknown bench,
+        `NotMounted` for its unit.
 
         `mounting`: the id of the unit's mounting; None: the one that stands on that bench, if any. Raises
         `BadParameter` for one that does not stand there.
@@ -66,11 +71,11 @@ class Planner:
         return context if stands is None else context.on(stands.for_context())
 
     def mounting(self, unit: str, bench: str) -> StoredMounting | None:
-        """The mounting of a unit that stands on a bench now."""
+        """Return the mounting of a unit that stands on a bench now; None where there is none."""
         return None if self._mountings is None else self._mountings.standing(unit, bench)
 
     def unit(self, serial: str, bench: str) -> Unit:
-        """A unit that is mounted on a bench, with its current calibration. Raises `NotMounted`, `NotFound`."""
+        """Return a unit that is mounted on a bench, with its current calibration. Raises `NotMounted`, `NotFound`."""
         mounted = {unit.serial: unit for unit in self.benches.mounted(bench, serial)}
         if serial not in mounted:
             raise NotMounted(f"bench {bench!r} has no unit {serial!r}; it has {', '.join(mounted)}")
@@ -87,12 +92,14 @@ class Planner:
         bench: str | None = None,
         mounting: str | None = None,
     ) -> Plan:
-        """Plan a job; nothing moves. Raises pydantic's `ValidationError`, `DomainError`, `NotFound`, `NotMounted`."""
+        """Return the plan of a job; nothing moves or is stored. Raises pydantic's `ValidationError`, `DomainError`,
+        `NotFound`, `NotMounted`.
+        """
         self.catalogue.procedure(name)  # an unknown procedure is said before an unknown unit
         return self.plan_in(self.context(unit, bench, mounting), name, requested)
 
     def plan_in(self, context: Context, name: str, requested: dict[str, Any]) -> Plan:
-        """Plan a job in a context that is known; raises as `plan`, but for the context."""
+        """Return the plan of a job in a context that is known; raises as `plan`, except for the context."""
         procedure = self.catalogue.procedure(name)
         parameters = procedure.resolve(procedure.params.model_validate(requested), context)
         stations = stations_of(procedure, parameters)
@@ -109,7 +116,9 @@ class Planner:
         return Plan(procedure, parameters, context, stations, prediction, data_bytes, violations)
 
     def refreshed(self, context: Context) -> Context:
-        """Refresh a context's unit: its noise, and the current calibration; bench and mounting stay the same."""
+        """Return the context with the unit's present noise and current calibration; bench and mounting stay the
+        same.
+        """
         return replace(context, unit=self._units.unit(context.unit.serial))
 
 

@@ -38,7 +38,7 @@ class QueueEntry:
 
 @dataclass(frozen=True)
 class Place:
-    """A queued job's place in the queue."""
+    """A queued job's place in the queue: its position, the number of jobs ahead, and the reason why it waits."""
 
     position: int
     """Position in the queue, counted from 1."""
@@ -50,7 +50,9 @@ class Place:
 
 @dataclass(frozen=True)
 class BenchQueue:
-    """A bench's queue at one moment."""
+    """A bench's queue at one moment: the waiting jobs in order, the running job, stops, reservations, lease of manual
+    mode.
+    """
 
     bench: str
     at: datetime
@@ -66,11 +68,11 @@ class BenchQueue:
     """The open lease of manual mode: no job starts before it has ended, and the bench is safe."""
 
     def next(self) -> QueueEntry | None:
-        """The next eligible job; None where no job is eligible."""
+        """Return the first job that may start now; None where none may."""
         return next((entry for entry in self.entries if self.hold(entry) is None), None)
 
     def hold(self, entry: QueueEntry) -> str | None:
-        """The reason why a job is not eligible, whatever else the bench does; None where it is."""
+        """Return the reason why a job may not start, apart from the running job; None where it may."""
         if self.stops:
             return f"bench {self.bench} is stopped: {reasons_of(self.stops)}"
         if (manual := self.manual) is not None:
@@ -90,11 +92,13 @@ class BenchQueue:
         return None
 
     def place(self, job_id: str, driven: bool) -> Place | None:
-        """The place of a job; None where it is not in the queue. `driven`: True where a worker drives the bench."""
+        """Return the place of a job; None where it is not in the queue. `driven`: True where a worker drives the
+        bench.
+        """
         return self.places(driven).get(job_id)
 
     def places(self, driven: bool) -> dict[str, Place]:
-        """The places of all queued jobs, by job id, in order: one walk for all of them."""
+        """Return the places of all queued jobs by job id, in the order of the queue, in one pass."""
         places: dict[str, Place] = {}
         ahead, last = (0, "") if self.running is None else (1, self.running)
         for number, entry in enumerate(self.entries, start=1):
@@ -125,14 +129,16 @@ class BenchQueue:
 
 
 class QueueStore(Protocol):
-    """The stored queues of all benches. Every method is one transaction."""
+    """Store of the queues of all benches. Every method is one transaction. Interface; the SQL is in `persistence`."""
 
     def look(self, bench: str, at: datetime) -> BenchQueue:
-        """The whole queue of a bench now."""
+        """Return the whole queue of a bench at a moment."""
         ...
 
     def front(self, bench: str, at: datetime) -> BenchQueue:
-        """The first entries of the queue: as many as `next` needs to answer as for the whole; none while a job runs."""
+        """Return the queue with its first entries alone: as many as `next` needs to answer as for the whole; none while
+        a job runs.
+        """
         ...
 
     def claim(self, entry: QueueEntry, context: dict[str, Any], at: datetime) -> Job | None:
@@ -144,7 +150,7 @@ class QueueStore(Protocol):
         ...
 
     def running(self, bench: str) -> QueueEntry | None:
-        """The job that drives a bench."""
+        """Return the running job of a bench; None where none runs."""
         ...
 
     def requeue(self, job_id: str, at: datetime, not_before: datetime | None, why: Failure, spend: bool) -> Job:
@@ -155,9 +161,11 @@ class QueueStore(Protocol):
         ...
 
     def set_priority(self, job_id: str, priority: int, at: datetime) -> Job:
-        """Change a queued job's priority. Raises `IllegalTransition` where it is not queued."""
+        """Change a queued job's priority and return the job. Raises `IllegalTransition` where it is not queued,
+        `NotFound`.
+        """
         ...
 
     def lengths(self) -> dict[str, int]:
-        """Number of queued jobs of each bench that has any."""
+        """Return the number of queued jobs of each bench that has any."""
         ...

@@ -35,14 +35,14 @@ class ReservationRequest:
 
 @dataclass(frozen=True)
 class Standing:
-    """A job's place while it is queued, and the reason why it does not run, as a sentence."""
+    """Place of a queued job, and the sentence that says why it does not run."""
 
     place: Place | None = None
     waiting: str | None = None
 
 
 class QueueService:
-    """Reads the queues of all benches, and keeps reservations."""
+    """Operations of clients on queues and reservations, on all benches."""
 
     def __init__(self, stores: JobStores, benches: BenchDirectory, wake: Callable[[str], None]) -> None:
         """Set up with `wake`, called for each bench on which a waiting job may now start."""
@@ -51,18 +51,20 @@ class QueueService:
         self._benches = benches
 
     def queue(self, bench_id: str) -> BenchQueue:
-        """A bench's queue now. Raises `NotFound`."""
+        """Return a bench's queue now. Raises `NotFound` for an unknown bench."""
         return self._stores.queue.look(self._benches.description(bench_id).id, now())
 
     def standing(self, jobs: Sequence[Job]) -> dict[str, Standing]:
-        """The standing of each of these jobs; each bench's queue is read once."""
+        """Return place and reason of each of these jobs, by job id; each bench's queue is read once."""
         places: dict[str, Place] = {}
         for bench in {job.bench for job in jobs if job.state is JobState.QUEUED}:
             places |= self._stores.queue.look(bench, now()).places(self._benches.driven(bench))
         return {job.id: _standing(job, places.get(job.id)) for job in jobs}
 
     def reserve(self, request: ReservationRequest, idempotency_key: str | None = None) -> Reservation:
-        """Reserve a bench or a unit. Raises `NotFound` for one that is unknown, `AlreadyReserved`, `BadParameter`."""
+        """Store a reservation of a bench or a unit, and return it. Raises `NotFound` for one that is unknown,
+        `AlreadyReserved`, `BadParameter`.
+        """
         at = now()
         until = request.until or at + timedelta(minutes=request.minutes or 0.0)
         if not at < until <= at + LONGEST:
@@ -77,7 +79,7 @@ class QueueService:
         return self._stores.reservations.add(made, key)
 
     def give_back(self, reservation_id: str) -> Reservation:
-        """End a reservation early. Raises `NotFound`."""
+        """End a reservation early, return it, and wake the benches whose jobs waited for it. Raises `NotFound`."""
         kept = self._stores.reservations.end(reservation_id, now())
         for bench_id in (kept.name,) if kept.kind is Reserved.BENCH else self._benches.ids():
             self._wake(bench_id)
@@ -98,7 +100,7 @@ class QueueService:
         return next((r.team for r in held if (r.kind, r.name) == (Reserved.BENCH, bench_id)), "")
 
     def usable(self, reservation_id: str, bench: str, unit: str) -> None:
-        """Refuse a reservation that does not hold, or is for another bench or unit. Raises `BadParameter`."""
+        """Refuse a reservation that is over, or is for another bench or unit. Raises `BadParameter`."""
         try:
             found = self._stores.reservations.get(reservation_id)
         except NotFound:

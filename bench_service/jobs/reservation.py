@@ -9,7 +9,7 @@ from bench_service.model.records import Idempotency, Page
 
 
 class Reserved(StrEnum):
-    """The kinds of things that can be reserved."""
+    """The kinds of things that can be reserved: a bench, a unit."""
 
     BENCH = "bench"
     UNIT = "unit"
@@ -44,15 +44,17 @@ class Reservation:
 
     @property
     def over_at(self) -> datetime:
-        """Time of its end, past or scheduled."""
+        """Time at which the reservation ended or will end."""
         return self.until if self.ended_at is None else self.ended_at
 
 
 class ReservationStore(Protocol):
-    """Stored reservations of all holders. Every method is one transaction."""
+    """Store of all reservations. Every method is one transaction. Interface; the SQL is in `persistence`."""
 
     def add(self, reservation: Reservation, idempotency: Idempotency | None = None) -> Reservation:
-        """Add a reservation, at its `created_at`. Raises `AlreadyReserved`, `IdempotencyConflict`."""
+        """Store a reservation that begins at its `created_at`, and return it. Raises `AlreadyReserved`,
+        `IdempotencyConflict`.
+        """
         ...
 
     def get(self, reservation_id: str) -> Reservation:
@@ -62,9 +64,9 @@ class ReservationStore(Protocol):
     def list(
         self, *, active_at: datetime | None = None, after: str | None = None, limit: int = 50
     ) -> Page[Reservation]:
-        """List reservations, newest first; with `active_at` only those that hold at that moment."""
+        """Return one page of reservations, newest first; with `active_at` only those that hold at that moment."""
         ...
 
     def end(self, reservation_id: str, at: datetime) -> Reservation:
-        """End a reservation early; one that is over stays as it is. Raises `NotFound`."""
+        """End a reservation early and return it; one that is over stays as it is. Raises `NotFound`."""
         ...

@@ -27,7 +27,7 @@ SEEDS = SystemRandom()
 
 
 class JobService:
-    """The verbs of clients on jobs; each is complete when it returns."""
+    """Operations of clients on jobs; each is complete when it returns."""
 
     def __init__(
         self,
@@ -49,9 +49,10 @@ class JobService:
         self._wake = wake
 
     def submit(self, request: JobRequest, key: str | None = None, requested_by: str = "", *, team: str = "") -> Job:
-        """Plan, store and queue a job; `team`: of the campaign run to which it belongs.
+        """Plan a job, refuse it or store and queue it, and return it. Raises the errors of `Planner.plan`,
+        `BadParameter` for a violated limit of the bench, a seed or a reservation that does not fit.
 
-        Raises the errors of `Planner.plan`, and `BadParameter` for an axis limit.
+        `team`: of the campaign run to which it belongs. A known `key` returns the job that it made.
         """
         idempotency = Idempotency.of("jobs", key, request)
         known = self._stores.keys.made(idempotency, "job")
@@ -73,29 +74,37 @@ class JobService:
         return stored
 
     def cancel(self, job_id: str, by: str = "", reason: str = "") -> Job:
-        """Request a job's cancellation, for an author and a reason. Raises `IllegalTransition` where it has ended."""
+        """Store the request to cancel a job, with its author and reason, and return the job. Raises `IllegalTransition`
+        where it has ended.
+        """
         return self._stores.jobs.request_cancel(job_id, now(), by, reason)
 
     def pause(self, job_id: str) -> Job:
-        """Pause a job, a running one before its next station. Raises `IllegalTransition` where it has ended."""
+        """Pause a job, a running one before its next station, and return it. Raises `IllegalTransition` where it has
+        ended.
+        """
         return self._stores.jobs.request_pause(job_id, now())
 
     def resume(self, job_id: str) -> Job:
-        """Resume a job with the stations that remain. Raises `IllegalTransition`."""
+        """Requeue a paused or interrupted job with the stations that remain, and return it. Raises
+        `IllegalTransition`.
+        """
         job = self._stores.jobs.resume(job_id, now())
         self._wake(job.bench)
         return job
 
     def set_priority(self, job_id: str, priority: int) -> Job:
-        """Change the priority of a queued job. Raises `IllegalTransition` where it is not queued."""
+        """Change the priority of a queued job and return it. Raises `IllegalTransition` where it is not queued."""
         return self._stores.queue.set_priority(job_id, priority, now())
 
     def running_job(self, bench_id: str) -> QueueEntry | None:
-        """The bench's running job: begun and not ended."""
+        """Return the bench's job in state running, as the database has it; None where there is none."""
         return self._stores.queue.running(bench_id)
 
     def driving_job(self, bench_id: str) -> str | None:
-        """Id of the job that drives a bench now; a job whose end only waits to be written no longer drives it."""
+        """Return the id of the job that drives a bench now; a job whose end only waits to be written no longer drives
+        it.
+        """
         if self._worker is not None and self._driver is not None and self._driver.description.id == bench_id:
             driving = self._worker.running_job()
         else:
@@ -103,14 +112,14 @@ class JobService:
         return None if driving is None else driving.id
 
     def result_of(self, job_id: str) -> StoredResult:
-        """The result that gave the job its verdict. Raises `NotFound` where it has none (yet)."""
+        """Return the result that gave the job its verdict. Raises `NotFound` where it has none (yet)."""
         job = self._stores.jobs.get(job_id)
         if job.result_id is None:
             raise NotFound("result of job", job_id, f"it is {job.state.value}")
         return self._stores.results.get(job.result_id)
 
     def truth(self, job_id: str) -> tuple[TrueTriad, ...]:
-        """The true values of a simulated unit in a job. Raises `NotFound` on a real bench."""
+        """Return the true values of a simulated unit in a job, one a triad. Raises `NotFound` on a real bench."""
         job = self._stores.jobs.get(job_id)
         if not job.simulated or job.seed is None:
             raise NotFound("truth of job", job_id, "the truth of a real bench is not known")

@@ -23,7 +23,8 @@ log = logging.getLogger(__name__)
 
 
 class StopEntry:
-    """Enters stops into the database.
+    """Enters a stop of the stop channel into the database: the stop, the cancellation of the running job, an audit
+    entry.
 
     Several processes enter the same stop, and each repeats it from the beginning where the database fails in between.
     So each part changes nothing where it was done before, and none is left out because an earlier one was done.
@@ -45,7 +46,7 @@ class StopEntry:
         running = self._queue.running(bench_id) if stop.stands else None
         if running is not None:
             with suppress(IllegalTransition, NotUnderstood):  # it has ended this moment; or this version cannot read it
-                self._jobs.request_cancel(running.id, now())
+                self._jobs.request_cancel(running.id, now(), word.by, f"stop of bench {bench_id}: {reason}")
         self._note(word, stop)
         return None if running is None else running.id
 

@@ -27,7 +27,7 @@ class _Waiting:
 
 
 class StopLedger:
-    """Enters stops one after the other, and retries each until the database has it."""
+    """Thread that enters stops into the database one after the other, and retries each until the database has it."""
 
     def __init__(self, enter: Callable[[str, StopWord], str | None]) -> None:
         """Set up with `enter`: enters a stop, returns the job that it ended; raises `NotFound`, `ServiceError`."""

@@ -27,7 +27,9 @@ BOOKS_S = 1.0
 
 @dataclass(frozen=True)
 class Stopped:
-    """The outcome of a software stop."""
+    """Outcome of a software stop: the stop, the job that it ended, the bench's safety, and why the database lacks it,
+    if so.
+    """
 
     stop: BenchStop
     job: str | None
@@ -39,7 +41,7 @@ class Stopped:
 
 
 class StopService:
-    """Stops benches and releases them from their stops."""
+    """Operations of clients on stops: stops benches on this host or another, and releases them."""
 
     def __init__(
         self,

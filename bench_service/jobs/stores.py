@@ -1,4 +1,4 @@
-"""Stores of the jobs room: jobs with their events, the queues of benches, and reservations.
+"""Stores that `jobs` needs: jobs with their events, the queues of benches, reservations, leases of manual mode.
 
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
@@ -19,9 +19,11 @@ from procedures.core.limits import Verdict
 
 
 class JobStore(Protocol):
-    """Jobs and their events. Every change of state appends an event in the same transaction.
+    """Store of jobs and their events. Every change of state appends an event in the same transaction. Interface; the
+    SQL is in `persistence`.
 
-    A job that is not understood is left out of lists; every method that gives one raises `NotUnderstood`."""
+    A job that is not understood is left out of lists; every method that gives one raises `NotUnderstood`.
+    """
 
     def add(self, job: Job, idempotency: Idempotency | None = None) -> Job:
         """Store a new job; or, where the key is known with the same fingerprint, return the job it made.
@@ -39,7 +41,7 @@ class JobStore(Protocol):
         ...
 
     def numbers(self, ids: Sequence[str]) -> dict[str, int]:
-        """Numbers of jobs by their ids; an id of none is left out."""
+        """Return the numbers of jobs by their ids; an id that no job has is left out."""
         ...
 
     def list(
@@ -55,11 +57,13 @@ class JobStore(Protocol):
     ) -> Page[Job]: ...
 
     def counts(self, states: Collection[JobState] = tuple(JobState)) -> dict[JobState, int]:
-        """Number of jobs in each of some states; to count ended jobs takes the longer, the longer the history is."""
+        """Return the number of jobs in each of some states; to count ended jobs takes the longer, the longer the
+        history is.
+        """
         ...
 
     def has_any(self) -> bool:
-        """Return whether there is any job."""
+        """Return whether the database has any job."""
         ...
 
     def transition(
@@ -72,7 +76,9 @@ class JobStore(Protocol):
         failure: Failure | None = None,
         result_id: str | None = None,
     ) -> Job:
-        """Change a job's state; a change to its present state is a no-op. Raises `IllegalTransition`, `NotFound`."""
+        """Change a job's state, with the fields that depend on it, and return the job; a change to its present state is
+        a no-op. Raises `IllegalTransition`, `NotFound`.
+        """
         ...
 
     def interrupt(self, job_id: str, at: datetime, failure: Failure) -> None:
@@ -83,7 +89,9 @@ class JobStore(Protocol):
         ...
 
     def station_done(self, job_id: str, station: int, at: datetime, data: dict[str, Any]) -> Job:
-        """Note that recordings up to and including `station` (index) are complete; idempotent."""
+        """Store that recordings up to and including `station` (index from 0) are complete, and return the job;
+        idempotent.
+        """
         ...
 
     def request_cancel(self, job_id: str, at: datetime, by: str = "", reason: str = "") -> Job:
@@ -105,7 +113,9 @@ class JobStore(Protocol):
         ...
 
     def put_aside(self, job_id: str, at: datetime) -> Job:
-        """Pause a job whose bench was made safe for a pause; it is requeued where the pause was withdrawn."""
+        """Pause a job whose bench was made safe for a pause, and return it; it is requeued where the pause was
+        withdrawn.
+        """
         ...
 
     def resume(self, job_id: str, at: datetime) -> Job:
@@ -116,11 +126,11 @@ class JobStore(Protocol):
         ...
 
     def note(self, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
-        """Append an event that does not change the job's state."""
+        """Append an event that does not change the job's state, with `data` as its JSON. Raises `NotFound`."""
         ...
 
     def events(self, job_id: str, after: int = 0, limit: int = 1000) -> tuple[Event, ...]:
-        """Events with a sequence greater than `after`, in order. Raises `NotFound`."""
+        """Return at most `limit` events with a sequence greater than `after`, in order. Raises `NotFound`."""
         ...
 
     def last_event(self, job_id: str) -> tuple[int, JobState]:
@@ -134,7 +144,7 @@ class JobStore(Protocol):
 
 @dataclass(frozen=True)
 class JobStores(BenchStores):
-    """The stores of this room and of those below it."""
+    """The stores that `jobs` needs, with those of `bench` and the packages below it, as one value."""
 
     jobs: JobStore
     queue: QueueStore

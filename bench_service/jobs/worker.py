@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 
 class JobDispatcher(Protocol):
-    """The part of `bench_service.jobs.dispatcher.Dispatcher` that the worker uses."""
+    """The part of `bench_service.jobs.dispatcher.Dispatcher` that the worker uses. Interface."""
 
     def begin(self) -> None: ...
 
@@ -41,7 +41,7 @@ class JobDispatcher(Protocol):
 
 
 class Worker:
-    """Runs the jobs of one bench from `begin` to `shut_down`."""
+    """Runs the jobs of one bench from `begin` to `shut_down`: launches the job engine, then the dispatcher."""
 
     def __init__(
         self,
@@ -75,18 +75,20 @@ class Worker:
         Thread(target=self._give_up, name="engine's launch limit", daemon=True).start()
 
     def require_engine(self) -> JobEngine:
-        """The engine, once it runs. Raises `NotDriving` with the reason where it did not start."""
+        """Wait until the engine runs, and return it. Raises `NotDriving` with the reason where it did not start."""
         self._begun.wait()
         if self._engine is None:
             raise NotDriving(self._failure)
         return self._engine
 
     def failed_start(self) -> NotDriving | None:
-        """The reason why the engine did not start; None where it runs, or may yet."""
+        """Return the reason why the engine did not start; None where it runs, or may yet."""
         return None if self._failure is None else NotDriving(self._failure)
 
     def troubles(self) -> list[str]:
-        """The reasons why a job could not start on this bench now; waits for the engine after a start."""
+        """Return the reasons why a job could not start on this bench now, a sentence each; waits for the engine after a
+        start.
+        """
         try:
             self.require_engine()
         except NotDriving as reason:
@@ -96,16 +98,16 @@ class Worker:
         return []
 
     def wake(self) -> None:
-        """Look at the queue now: a job was queued, or a bench released."""
+        """Have the dispatcher look at the queue now, because a job was queued or a bench released."""
         if self._dispatcher is not None:
             self._dispatcher.wake()
 
     def running_job(self) -> Job | None:
-        """The job whose bench is open in this process."""
+        """Return the job whose session is open in this process; None where there is none."""
         return self._runner.running_job()
 
     def shut_down(self) -> None:
-        """Stop the bench's worker. The running job is left for the next start; the bench is made safe first."""
+        """Stop the bench's worker, and wait until the bench is safe. The running job resumes after the next start."""
         if self._thread is None:
             return
         self._ending.set()

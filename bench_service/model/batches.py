@@ -11,7 +11,7 @@ from bench_service.model.search import EVERYTHING, Search
 
 
 class Grouping(StrEnum):
-    """The recordings that one task analyses together."""
+    """Rule for which recordings one task of a batch analyses together."""
 
     RECORDING = "recording"
     JOB = "job"
@@ -71,14 +71,14 @@ class BatchTerms:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchRequest(BatchTerms):
-    """A client's request for a batch."""
+    """A client's request for a batch of analyses: a selection of recordings, and the terms of the analysis."""
 
     selection: Selection
 
 
 @dataclass(frozen=True, kw_only=True)
 class AnalysisBatch(BatchTerms):
-    """A stored batch with the counts of its tasks."""
+    """A stored batch of analyses, with the number of its tasks in each state."""
 
     id: str
     version: str
@@ -95,7 +95,7 @@ class AnalysisBatch(BatchTerms):
 
     @property
     def state(self) -> BatchState:
-        """The state that follows from the tasks."""
+        """State of the batch that follows from the states of its tasks."""
         running, waiting = self.counts.get(TaskState.RUNNING, 0), self.counts.get(TaskState.WAITING, 0)
         if self.cancelled_at is not None:
             return BatchState.CANCELLING if running else BatchState.CANCELLED

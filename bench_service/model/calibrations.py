@@ -22,10 +22,12 @@ class Approval(StrEnum):
 
 
 class Act(StrEnum):
-    """Decision about a calibration."""
+    """Kind of decision of a person about a calibration or a correction."""
 
     ENTERED = "entered"
     CHOSEN = "chosen"
+    GIVEN_BACK = "given back"
+    """A person gave the kind of a correction back to the rule, which made this one current."""
     APPROVED = "approved"
     REJECTED = "rejected"
 
@@ -44,13 +46,13 @@ class Coefficient:
 
     @property
     def dotted(self) -> CoefficientName:
-        """The name as results, limits and trends write it: "gyro.b_x"."""
+        """Name as results, limits and trends write it: "gyro.b_x"."""
         return CoefficientName(self.subject, self.name)
 
 
 @dataclass(frozen=True)
 class Decision:
-    """A decision about a calibration; decisions are added, and never changed or removed."""
+    """A person's decision about a calibration; decisions are added, and never changed or removed."""
 
     calibration_id: str
     act: Act
@@ -65,7 +67,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Decider:
-    """Person who decides, and the remark that goes with the decision."""
+    """The person who decides, and the remark that goes with the decision."""
 
     by: str
     remark: str = ""
@@ -112,7 +114,7 @@ class StoredCalibration:
         return coefficients_of(self.value)
 
     def unusable(self, at: datetime) -> str:
-        """Reason why it may not be used at a time, with the way out; empty where it may."""
+        """Return the reason why it may not be used at a time, with the way out; empty where it may."""
         what = f"calibration {self.id} of the {self.triad} triad"
         other = "choose another calibration of its history, enter known coefficients, or calibrate again"
         if self.approval is Approval.REJECTED:
@@ -127,7 +129,7 @@ class StoredCalibration:
 
 
 def coefficients_of(value: TriadCalibration) -> tuple[Coefficient, ...]:
-    """The coefficients of a calibration with their units, in the order of `COEFFICIENT_NAMES`."""
+    """Return the coefficients of a calibration with their units, in the order of `COEFFICIENT_NAMES`."""
     numbers = zip(COEFFICIENT_NAMES, value.coefficients.tolist(), value.standard_uncertainties.tolist(), strict=True)
     return tuple(
         Coefficient(value.triad, name, number, coefficient_unit(name, value.output_unit, value.input_unit), sd)
@@ -136,7 +138,7 @@ def coefficients_of(value: TriadCalibration) -> tuple[Coefficient, ...]:
 
 
 def takes_over(verdict: Verdict, current: StoredCalibration | None, at: datetime) -> bool:
-    """The rule: a job's calibration becomes current if the job passed and no person's usable choice stands.
+    """Return whether a job's calibration becomes current: the job passed, and no usable choice of a person stands.
 
     A choice of a person stands until the person gives the triad back to the rule, or the chosen one is rejected or
     expires.

@@ -5,6 +5,7 @@ The stored context names the unit's calibrations by their ids: their coefficient
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -15,20 +16,24 @@ from bench_service.model.job import Job
 from procedures.core.errors import DomainError
 from procedures.procedure import Context
 
-CONTEXT = TypeAdapter(Context)
+
+@cache
+def _adapter() -> TypeAdapter[Context]:
+    """Build what reads and writes contexts when the first one comes: it takes as long as the imports of a room."""
+    return TypeAdapter(Context)
 
 
 def context_document(context: Context) -> dict[str, Any]:
-    """The context as JSON, without the coefficients of calibrations that have an id."""
+    """Return the context of a job as a JSON object, without the coefficients of calibrations that have an id."""
     unit = context.unit
     stored = len(unit.calibration_ids) == len(unit.calibrations)
-    return CONTEXT.dump_python(context, mode="json", exclude={"unit": {"calibrations"}} if stored else None)
+    return _adapter().dump_python(context, mode="json", exclude={"unit": {"calibrations"}} if stored else None)
 
 
 def context_of(job: Job, calibrations: Callable[[Sequence[str]], Sequence[StoredCalibration]]) -> Context:
-    """Read a job's context back from JSON, with the `calibrations` that it names. Raises `NotUnderstood`."""
+    """Return a job's context, read back from JSON, with the `calibrations` that it names. Raises `NotUnderstood`."""
     try:
-        context = CONTEXT.validate_python(job.context)
+        context = _adapter().validate_python({**job.context, "unit": unit_document(job.context)})
     except (ValueError, DomainError) as error:
         raise NotUnderstood(job.id, job.code_version, error) from error
     unit = context.unit
@@ -38,6 +43,21 @@ def context_of(job: Job, calibrations: Callable[[Sequence[str]], Sequence[Stored
 
 
 def withheld_calibration(job: Job, triads: Sequence[str]) -> str:
-    """Reason why a calibration that a job needs may not be used, as its context says; empty where all may."""
-    unit = job.context.get("unit") or {}
-    return "; ".join(entry["why"] for entry in unit.get("withheld") or () if entry["triad"] in triads)
+    """Return the reason why a calibration that a job needs may not be used, as its context says; empty where all
+    may.
+    """
+    unit = unit_document(job.context)
+    return "; ".join(entry["why"] for entry in unit.get("withheld") or () if entry["subject"] in triads)
+
+
+def unit_document(context: dict[str, Any]) -> dict[str, Any]:
+    """The unit of a stored context as this release reads it; {} where there is none.
+
+    Contexts of earlier versions call the subject of what was withheld its triad, also where it was a correction.
+    """
+    unit: dict[str, Any] = context.get("unit") or {}
+    withheld: list[dict[str, Any]] = unit.get("withheld") or []
+    if not any("triad" in entry for entry in withheld):
+        return unit
+    renamed = [{"subject" if key == "triad" else key: value for key, value in entry.items()} for entry in withheld]
+    return {**unit, "withheld": renamed}

@@ -124,21 +124,21 @@ class Job(JobTerms):
 
     @property
     def resumable(self) -> bool:
-        """Return whether it can be queued again to continue where it ended."""
+        """True where the job can be queued again to continue where it ended."""
         if self.state is JobState.FAILED:
             return self.failure is not None and self.failure.kind in RESUMABLE
         return self.state in (JobState.PAUSED, JobState.INTERRUPTED)
 
 
 def job_number(text: str) -> int | None:
-    """Read a job's number as people write it, 123 or #123; None for any other text."""
+    """Return a job's number from text as people write it, 123 or #123; None for any other text."""
     digits = text.removeprefix("#")
     return int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= NUMBER_DIGITS else None
 
 
 @dataclass(frozen=True)
 class Event:
-    """An entry in a job's history; `sequence` counts from 1 within the job."""
+    """An entry in a job's history, with its kind and data; `sequence` counts from 1 within the job."""
 
     job_id: str
     sequence: int

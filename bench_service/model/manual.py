@@ -11,7 +11,7 @@ MOTIONS = frozenset({"home", "go_to", "rate"})
 
 
 class DemandState(StrEnum):
-    """States of a demand."""
+    """States of a demand of manual mode, from accepted to its end."""
 
     ACCEPTED = "accepted"
     DOING = "doing"
@@ -25,13 +25,13 @@ class DemandState(StrEnum):
 
     @property
     def over(self) -> bool:
-        """Return whether nothing more becomes of it."""
+        """True for a state that is never left: the demand is done, refused, failed or stopped."""
         return self not in (DemandState.ACCEPTED, DemandState.DOING)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Outcome of a demand for its client."""
+    """Outcome of a demand for its client: a sentence, and of a refusal the field, its value and what is allowed."""
 
     text: str = ""
     field: str | None = None
@@ -71,13 +71,15 @@ class ManualLease:
     """Whether the bench was left safe; None while the lease is active."""
 
     def live(self, at: datetime) -> bool:
-        """Return whether it holds the bench at a moment. Its end is this one moment and not that of its last motion."""
+        """Return whether the lease holds the bench at a moment. Its end is this one moment and not that of its last
+        motion.
+        """
         return self.ended_at is None and at < self.until
 
 
 @dataclass(frozen=True)
 class ManualDemand:
-    """One demand of a lease, as it was accepted, and what became of it."""
+    """One demand of a lease, as it was accepted, with its state and its answer."""
 
     id: str
     lease: str

@@ -35,9 +35,9 @@ class StoredMounting:
 
     @property
     def stands(self) -> bool:
-        """Return whether the unit is still mounted so."""
+        """True while the unit has not been taken off and no other mounting has replaced this one."""
         return self.ended_at is None
 
     def for_context(self) -> Mounting:
-        """The facts that a job's context keeps."""
+        """Return the part of the mounting that a job's context keeps."""
         return copied(Mounting, self, mounted_at=self.mounted_at.isoformat())

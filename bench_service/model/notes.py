@@ -6,7 +6,7 @@ from datetime import datetime
 
 @dataclass(frozen=True)
 class UnitNote:
-    """A remark; it is never changed, and stays with the unit."""
+    """A person's remark about a unit; it is never changed, and stays with the unit."""
 
     id: str
     unit: str

@@ -21,7 +21,9 @@ class Quantity:
 
 
 def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
-    """Every check and every named estimate (an entry with name, unit and estimate) of a document, by name."""
+    """Return every check and every named estimate (an entry with name, unit and estimate) of a result's document, by
+    name.
+    """
     found = {
         check["name"]: Quantity(
             check["name"],
@@ -41,7 +43,9 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
 
 
 def quantity(document: Mapping[str, Any], name: str) -> Quantity:
-    """A named quantity, or the number at a JSON pointer (RFC 6901). Raises `NotFound`, naming the known quantities."""
+    """Return a named quantity of a result's document, or the number at a JSON pointer (RFC 6901). Raises `NotFound`,
+    naming the known quantities.
+    """
     if name.startswith("/"):
         return Quantity(name, _pointed(document, name), "")
     found = quantities(document)

@@ -28,7 +28,7 @@ HERE = (RawState.STORED, RawState.RESTORING)
 
 
 class Keeping(StrEnum):
-    """A reason that keeps raw data which are old enough to go."""
+    """Reason for which raw data stay that are old enough to be removed."""
 
     CALIBRATION = "calibration"
     """A current or an approved calibration or correction rests on it; certificates are issued for these."""
@@ -42,7 +42,7 @@ class Keeping(StrEnum):
 
 @dataclass(frozen=True)
 class RawRule:
-    """A rule: the raw data of which recordings go, `days` after they were made or restored.
+    """A rule of retention: which raw data are removed or archived, `days` after they were made or restored.
 
     Removal concerns routine passes only: recordings of a job that ended with the verdict pass. Archiving concerns every
     complete recording.
@@ -54,7 +54,7 @@ class RawRule:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A recording that is old enough by a rule."""
+    """A recording whose raw data are old enough for a rule, with its job and its size."""
 
     id: str
     job: str | None

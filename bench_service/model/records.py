@@ -28,14 +28,14 @@ class Page(Generic[T]):
 
 @dataclass(frozen=True)
 class Idempotency:
-    """A client's key and the fingerprint of its request."""
+    """A client's idempotency key within its scope, and the fingerprint of its request."""
 
     key: str
     fingerprint: str
 
     @classmethod
     def of(cls, scope: str, key: str | None, request: object) -> "Idempotency | None":
-        """The key of a request within its scope, as "jobs"; None for a client that sent no key."""
+        """Return the key of a request within a scope such as "jobs"; None for a client that sent no key."""
         return None if key is None else cls(f"{scope}:{key}", fingerprint(request))
 
 
@@ -49,7 +49,7 @@ class RecordingState(StrEnum):
 
 @dataclass(frozen=True)
 class StoredRecording:
-    """A recording's row: its description, its origin, its size."""
+    """A recording's row: its description, state, origin, size and the place of its raw samples; no samples."""
 
     info: RecordingInfo
     state: RecordingState
@@ -72,7 +72,7 @@ class StoredRecording:
 
 @dataclass(frozen=True)
 class NewRecording:
-    """The facts of a recording that must be known before its first sample."""
+    """Facts of a recording that must be known before its first sample: unit, channels, rate, start, job."""
 
     unit: str
     channels: tuple[Channel, ...]
@@ -115,7 +115,7 @@ class BenchStop:
 
     @property
     def stands(self) -> bool:
-        """Return whether the stop is not yet released."""
+        """True while no person has released the stop."""
         return self.released_at is None
 
 
@@ -124,7 +124,7 @@ SHOWN_STOPS = 3
 
 
 def reasons_of(stops: Sequence[BenchStop]) -> str:
-    """The reasons why a bench is stopped, in one sentence."""
+    """Return the reasons why a bench is stopped as one sentence, the first few in full."""
     reasons = list(dict.fromkeys(stop.reason for stop in stops))
     more = f" (and {len(reasons) - SHOWN_STOPS} more reasons)" if len(reasons) > SHOWN_STOPS else ""
     return "; ".join(reasons[:SHOWN_STOPS]) + more
@@ -132,7 +132,7 @@ def reasons_of(stops: Sequence[BenchStop]) -> str:
 
 @dataclass(frozen=True)
 class StoredResult:
-    """The result of an analysis, and all its inputs."""
+    """The result of an analysis: its document and verdict, with all its inputs (lineage)."""
 
     id: str
     kind: str

@@ -33,7 +33,7 @@ class JobTerms:
 
 @dataclass(frozen=True, kw_only=True)
 class JobRequest(JobTerms):
-    """A client's request for a job."""
+    """A client's request for a job: the terms, the bench, the parameters, and the earliest start."""
 
     bench: str | None = None
     not_before: datetime | None = None
@@ -42,7 +42,7 @@ class JobRequest(JobTerms):
 
 
 def fingerprint(request: object) -> str:
-    """A digest of a client's request, the same for the same request."""
+    """Return a digest of a client's request, the same for the same request."""
     return hashlib.sha256(json.dumps(request, sort_keys=True, default=_plain).encode()).hexdigest()
 
 

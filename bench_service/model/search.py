@@ -8,14 +8,14 @@ from procedures.core.limits import Verdict
 
 @dataclass(frozen=True)
 class LabelSought:
-    """A label that a job must have, and its value where only one value counts."""
+    """A label that a job must have, and its value where only one value is accepted."""
 
     name: str
     value: str | None = None
 
     @classmethod
     def parse(cls, text: str) -> "LabelSought":
-        """Read `name` or `name=value`; the name ends at the first equals sign."""
+        """Return the condition that `name` or `name=value` states; the name ends at the first equals sign."""
         name, equals, value = text.partition("=")
         return cls(name, value if equals else None)
 

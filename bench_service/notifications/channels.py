@@ -24,7 +24,9 @@ class Undelivered(Exception):
 
 
 def deliver(target: Mail | Webhook, message: Message, pages: str) -> None:
-    """Deliver a message. Raises `Undelivered`, `Misconfigured`."""
+    """Send a message to its target by SMTP or HTTP, and wait for the target's answer. Raises `Undelivered`,
+    `Misconfigured`.
+    """
     if isinstance(target, Mail):
         _mail(target, message, pages)
     else:

@@ -44,7 +44,7 @@ def of_event(job: Job, event: Event) -> Message | None:
 
 
 def of_stop(stop: BenchStop) -> Message:
-    """Message about a stop that stands."""
+    """Make the message about a stop that stands, for the people that targets name."""
     text = f"Stopped by {stop.by or 'somebody'}: {stop.reason}. Jobs wait until a person releases it."
     return Message(
         f"stop-{stop.id}", "stop", f"{stop.bench}: STOPPED", text, stop.bench, stop.at, f"/#bench-{stop.bench}"
@@ -52,7 +52,9 @@ def of_stop(stop: BenchStop) -> Message:
 
 
 def of_run(run: CampaignRun, at: datetime) -> Message | None:
-    """Message about a campaign run that ended otherwise than with a pass."""
+    """Make the message about a campaign run that ended otherwise than with a pass; None for a run that passed or goes
+    on.
+    """
     if run.open or run.verdict is Verdict.PASS:
         return None
     outcome = run.state.value if run.verdict is None else run.verdict.value
@@ -70,13 +72,13 @@ def of_run(run: CampaignRun, at: datetime) -> Message | None:
 
 
 def of_disk(bench: str, free: int, at: datetime) -> Message:
-    """Message about a disk that is nearly full: one a day."""
+    """Make the message about a disk that is nearly full; its key has the date, so there is one a day."""
     text = f"{free / 1e6:.0f} MB are free on the disk of the database: recordings will soon be refused."
     return Message(f"disk-{at.date().isoformat()}", "disk", f"{bench}: the disk is nearly full", text, bench, at, "/")
 
 
 def digest(messages: list[Message], bench: str, at: datetime) -> Message:
-    """One message in place of many that came too fast."""
+    """Make one message from many that came too fast, with the title and time of each."""
     lines = [f"{one.at.isoformat(timespec='seconds')}  {one.title}" for one in messages]
     title = f"{bench}: {len(messages)} messages that came too fast"
     return Message(f"digest-{messages[0].key}", messages[0].kind, title, "\n".join(lines), bench, at, "/")

@@ -26,7 +26,9 @@ log = logging.getLogger(__name__)
 
 
 class Notifier:
-    """Turns what happens on a bench into messages."""
+    """Thread that watches one bench, its jobs and campaign runs, makes messages of what happens, and has each target's
+    outbox deliver them.
+    """
 
     def __init__(
         self,
@@ -56,7 +58,9 @@ class Notifier:
         self._thread.start()
 
     def end(self) -> None:
-        """Stop the thread; what waits is sent by the next process."""
+        """Stop the thread and wait for it, at most 15 s; undelivered messages stay in their files for the next
+        process.
+        """
         self._ending.set()
         self._woken.set()
         self._thread.join(15.0)

@@ -13,7 +13,9 @@ from bench_service.settings import Settings
 def begin_notifier(
     settings: Settings, stores: Stores, free_bytes: Callable[[], int | None], least_free_bytes: int, closing: ExitStack
 ) -> None:
-    """Begin the notifier of this process's bench, where the settings name targets. Raises `Misconfigured`."""
+    """Start the notifier of this process's bench, where `BENCH_NOTIFY` names a file of targets; it ends with `closing`.
+    Raises `Misconfigured`.
+    """
     if settings.notify is None:
         return
     targets = read_targets(settings.notify)

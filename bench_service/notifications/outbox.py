@@ -1,4 +1,4 @@
-"""Messages that wait for one target: one file each, so that none is lost with the process, in the order they came."""
+"""Queue of one target's undelivered messages: one file each, oldest first, so that none is lost with the process."""
 
 import logging
 import os
@@ -27,7 +27,9 @@ log = logging.getLogger(__name__)
 
 
 class Outbox:
-    """The waiting messages of a target, and when the next attempt is due."""
+    """Queue of one target's undelivered messages, one file each, so that it survives a restart. It delivers them with
+    growing pauses after failures.
+    """
 
     def __init__(self, folder: Path, target: Mail | Webhook, pages: str) -> None:
         self.target = target
@@ -44,7 +46,8 @@ class Outbox:
             self._book.write_text("\n".join(self._kept) + "\n", encoding="utf-8")
 
     def put(self, message: Message) -> None:
-        """Keep a message for the target, where it wants this kind; the same thing is kept once.
+        """Write a message into a file of the queue, if the target wants its kind; a message with a known key is left
+        out.
 
         An urgent one is tried at once, also while the target is left alone after a failure.
         """
@@ -67,7 +70,8 @@ class Outbox:
             self._due, self._pause = datetime.min.replace(tzinfo=now().tzinfo), FIRST_PAUSE
 
     def send(self, at: datetime) -> int:
-        """Deliver what waits and is due; the number of messages that are still waiting.
+        """Deliver the messages that are due, and return the number of those that still wait. Blocks while the target
+        answers.
 
         Urgent ones go first, each by itself, and neither count for `per_hour` nor wait for it.
         """

@@ -29,7 +29,7 @@ class _Target(BaseModel):
 
 
 class Mail(_Target):
-    """A mail server that takes messages, and the people that get them."""
+    """A target of kind mail: an SMTP server and the people that get its messages."""
 
     kind: Literal["smtp"]
     host: str = Field(min_length=1)
@@ -50,7 +50,7 @@ class Webhook(_Target):
 
 
 class Targets(BaseModel):
-    """The whole file: `[[target]]` tables, and the address under which people reach the pages."""
+    """The whole file of `BENCH_NOTIFY`: `[[target]]` tables, and the address under which people reach the pages."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -59,7 +59,7 @@ class Targets(BaseModel):
 
 
 def read_targets(file: Path) -> Targets:
-    """Read the file of `BENCH_NOTIFY`. Raises `Misconfigured` naming the field."""
+    """Read and check the file of `BENCH_NOTIFY`. Raises `Misconfigured` naming the field."""
     try:
         found = Targets.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -2,12 +2,13 @@
 
 import re
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.pages.rendering import templates
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 _OWN_PATH = re.compile(r"/(?![/\\])[^\x00-\x1f\\]*")
 
 
@@ -18,6 +19,6 @@ def own_path(given: str) -> str:
 
 @router.get("/log-in")
 def log_in_page(request: Request, next: str = "/") -> HTMLResponse:  # noqa: A002  the name in the address
-    """Page of the log-in; it continues with the page that was wanted."""
+    """Return the HTML page of the log-in; after it the browser goes to `next`, the page that was wanted."""
     headers = {"Cache-Control": "no-store"}
     return templates.TemplateResponse(request, "log_in.html", {"next": own_path(next)}, headers=headers)

@@ -1,16 +1,17 @@
 """Routes of the pages of manual mode and of mountings; both are made by scripts over the public API."""
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.pages.rendering import service_of, templates
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.get("/benches/{bench_id}/manual")
 def manual_page(bench_id: str, request: Request) -> HTMLResponse:
-    """Page where an operator commands an idle bench by hand; the limits stand beside each demand."""
+    """Return the HTML page where an operator commands an idle bench by hand; the limits stand at each demand."""
     service = service_of(request)
     description = service.benches.description(bench_id)
     units = [unit.serial for unit in service.benches.mounted(bench_id)]
@@ -19,7 +20,9 @@ def manual_page(bench_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/mountings")
 def mountings_page(request: Request) -> HTMLResponse:
-    """Page of mountings: which unit is on which plate, a new one is entered, and how well they repeat."""
+    """Return the HTML page of mountings: which unit is on which plate, a form for a new one, and how well they
+    repeat.
+    """
     service = service_of(request)
     units = [unit.serial for unit in service.stores.units.units()]
     context = {"benches": service.benches.ids(), "units": units}

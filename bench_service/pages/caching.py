@@ -1,4 +1,6 @@
-"""Answers that a browser may keep: with an ETag always, and for good under an address that names their version."""
+"""Answers that a browser may keep: with an ETag always, and without a date of expiry under an address that names their
+version.
+"""
 
 from collections.abc import Callable
 
@@ -11,7 +13,7 @@ ASK_AGAIN = "private, no-cache"
 def kept(
     request: Request, version: str, media_type: str, make: Callable[[], bytes | str], policy: str | None = None
 ) -> Response:
-    """The content of this version, or 304 where the browser has it: `make` is called only where it must be sent.
+    """Return the content of this version, or 304 where the browser has it: `make` is called only where it must be sent.
 
     An address with `v` equal to the version never changes. `policy`: a Content-Security-Policy of its own.
     """

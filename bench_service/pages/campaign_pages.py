@@ -2,7 +2,7 @@
 
 from urllib.parse import quote, urlencode
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.campaigns.run import CampaignRun, StepState
@@ -10,9 +10,10 @@ from bench_service.model.job import JobState
 from bench_service.pages.images import SHELF
 from bench_service.pages.rendering import service_of, templates
 from bench_service.pages.trend_chart import TrendQuery, trend_of, wanted_trend
+from bench_service.routing import Routes
 from procedures.core.units import DISPLAY
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 def _explanation(run: CampaignRun) -> str:
@@ -28,7 +29,7 @@ def _explanation(run: CampaignRun) -> str:
 
 @router.get("/campaigns")
 def campaigns_page(request: Request) -> HTMLResponse:
-    """Page of campaigns, schedules and the latest runs."""
+    """Return the HTML page of campaigns, schedules and the latest runs."""
     service = service_of(request)
     return templates.TemplateResponse(
         request,
@@ -43,7 +44,7 @@ def campaigns_page(request: Request) -> HTMLResponse:
 
 @router.get("/campaign-runs/{run_id}")
 def campaign_run_page(run_id: str, request: Request) -> HTMLResponse:
-    """Page of a campaign run: its steps, their results, and the reason that it waits for."""
+    """Return the HTML page of a campaign run: its steps, their results, and the reason that it waits for."""
     stores = service_of(request).stores
     run = stores.campaigns.run(run_id)
     jobs = [job for step in run.steps for job in (step.job_id, *step.earlier_jobs) if job]
@@ -61,7 +62,9 @@ def campaign_run_page(run_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/units/{serial}/trend")
 def trend_page(serial: str, request: Request, query: TrendQuery) -> HTMLResponse:
-    """Page of a quantity's trend over the unit's results; without a quantity, the list of those to choose from."""
+    """Return the HTML page of a quantity's trend over the unit's results; without a quantity, the list of those to
+    choose from.
+    """
     service = service_of(request)
     choice = wanted_trend(service, serial, query)
     chart = trend_of(service, serial, choice)

@@ -1,4 +1,4 @@
-"""Tables of a correction set. Knows how people read it; not where it is stored."""
+"""Tables of a correction set for people; where the set is stored is not known here."""
 
 import numpy as np
 
@@ -12,7 +12,9 @@ from procedures.core.units import DEG_PER_HOUR
 
 
 def correction_table(correction: UnitCorrection) -> Table:
-    """Coefficients of the three axes or channels, each with its standard uncertainty where it is known."""
+    """Return the table of the coefficients of the three axes or channels, each with its standard uncertainty where it
+    is known.
+    """
     if correction.thermal is not None:
         return _thermal(correction.thermal)
     if correction.thermometers is not None:

@@ -8,7 +8,9 @@ from bench_service.pages import figures
 
 
 def open_drawing() -> Run:
-    """Prepare a drawing process, see `WorkProcesses`: each piece of work is a figure, and gives its SVG document."""
+    """Return the function that a drawing process runs, see `WorkProcesses`: it takes a figure and returns its SVG
+    document.
+    """
     drawn_here(figures.SMALLEST)  # load matplotlib before the first one is waited for
 
     def run(_: str, arguments: tuple[Any, ...]) -> str:

@@ -9,14 +9,14 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bench_service.pages.rendering import templates
-
 PROBLEM = "application/problem+json"
 OF_PROGRAMS = ("/api/", "/static/", "/words/", "/healthz", "/readyz", "/metrics", "/openapi.json")
 
 
 class ErrorPages:
-    """ASGI middleware that shows the problem document of a page's address as a page, to who accepts HTML."""
+    """ASGI middleware that turns a problem document of a page's address into an HTML page, where the client accepts
+    HTML.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -51,6 +51,8 @@ def _is_problem(message: Message) -> bool:
 
 
 async def _show(scope: Scope, start: MutableMapping[str, Any], body: bytes, send: Send) -> None:
+    from bench_service.pages.rendering import templates  # with the other pages: a server that starts does without
+
     packed = Headers(raw=start["headers"]).get("content-encoding") == "gzip"
     problem = json.loads(gzip.decompress(body) if packed else body)
     page = templates.TemplateResponse(Request(scope), "error.html", {"problem": problem}, status_code=start["status"])

@@ -14,13 +14,14 @@ _elsewhere: list[WorkProcesses] = []
 """The processes that draw, where it is not this one."""
 
 
-def warm_up() -> None:
-    """Load matplotlib in the processes that draw, so that the first plot is not delayed."""
-    svg(SMALLEST)
+def expect() -> None:
+    """Begin the process that draws: a person has opened a page, and will come to a figure."""
+    for processes in _elsewhere:
+        processes.begin()
 
 
 def draw_in(processes: WorkProcesses | None) -> None:
-    """Draw in another process from now on; None: in this one."""
+    """Have figures drawn in these processes from now on; None: in this process."""
     _elsewhere[:] = [] if processes is None else [processes]
 
 

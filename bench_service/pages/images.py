@@ -8,7 +8,7 @@ import hashlib
 from collections import OrderedDict
 from threading import Lock
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 
 from bench_service.evidence.admission import Turns
 from bench_service.model.errors import NotFound
@@ -16,9 +16,10 @@ from bench_service.pages.caching import kept
 from bench_service.pages.figures import svg
 from bench_service.pages.rendering import service_of
 from bench_service.pages.trend_chart import TrendQuery, trend_of, wanted_trend
+from bench_service.routing import Routes
 from procedures.core.report import Figure, Report
 
-router = APIRouter(include_in_schema=False)
+router = Routes(include_in_schema=False)
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox"
 """Content-Security-Policy of a drawing: it has styles in place; opened alone it runs nothing."""
@@ -29,7 +30,7 @@ MOST = 200
 
 
 class FigureShelf:
-    """Figures of the latest pages, by version."""
+    """Cache of the figures of the latest pages, by version, for the requests of images that follow."""
 
     def __init__(self, most: int = MOST) -> None:
         self._figures: OrderedDict[str, Figure] = OrderedDict()
@@ -37,7 +38,9 @@ class FigureShelf:
         self._mutex = Lock()
 
     def put(self, figure: Figure, code_version: str) -> str:
-        """Keep a figure for its request; its version changes with its content, and with the code that draws it."""
+        """Keep a figure for its request, and return its version, which changes with its content and with the code that
+        draws it.
+        """
         version = hashlib.sha256(f"{code_version}\n{figure!r}".encode()).hexdigest()[:16]
         with self._mutex:
             self._figures[version] = figure
@@ -47,7 +50,7 @@ class FigureShelf:
         return version
 
     def get(self, version: str | None) -> Figure | None:
-        """Return the figure of a version, where it is still kept."""
+        """Return the figure of a version; None where it is no longer kept."""
         with self._mutex:
             return None if version is None else self._figures.get(version)
 
@@ -62,7 +65,9 @@ def report_figures(report: Report) -> list[Figure]:
 
 @router.get("/results/{result_id}/figures/{number}.svg")
 async def result_figure(result_id: str, number: int, request: Request) -> Response:
-    """Image of a figure of a result's report, by its number from 1; with `v`, the kept image of that version."""
+    """Return the image of a figure of a result's report, by its number from 1; with `v`, the kept image of that
+    version. Raises `NotFound`.
+    """
     return await IMAGES.run(_result_figure, result_id, number, request)
 
 
@@ -79,7 +84,7 @@ def _result_figure(result_id: str, number: int, request: Request) -> Response:
 
 @router.get("/units/{serial}/trend.svg")
 async def trend_image(serial: str, request: Request, query: TrendQuery) -> Response:
-    """Image of the chart of a quantity over a unit's results."""
+    """Return the image of the chart of a quantity over a unit's results. Raises `NotFound`."""
     return await IMAGES.run(_trend_image, serial, request, query)
 
 

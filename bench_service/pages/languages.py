@@ -9,13 +9,14 @@ from importlib.resources import files
 from io import BytesIO
 
 import polib
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from fastapi.responses import RedirectResponse
 
 from bench_service.model.errors import NotFound
 from bench_service.pages.caching import kept
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False)
+router = Routes(include_in_schema=False)
 
 LANGUAGES = {"en": "English", "uk": "Українська"}
 COOKIE = "bench_language"
@@ -26,7 +27,7 @@ LANGUAGE: ContextVar[str] = ContextVar("LANGUAGE", default="en")
 
 @cache
 def catalogue(language: str) -> polib.POFile:
-    """Read the catalogue of a language; of English it is empty."""
+    """Return the gettext catalogue of a language; of English it is empty."""
     if language == "en":
         return polib.POFile()
     text = (files("bench_service.pages") / "words" / f"{language}.po").read_text(encoding="utf-8")
@@ -40,12 +41,12 @@ def _translations(language: str) -> NullTranslations:
 
 
 def translated(text: str) -> str:
-    """Translate a text into the language of the page that is made now."""
+    """Return a text in the language of the page that is made now."""
     return _translations(LANGUAGE.get()).gettext(text)
 
 
 def translated_number(one: str, many: str, number: int) -> str:
-    """Translate a text about a number of things."""
+    """Return a text about a number of things in the language of the page, in the right plural."""
     return _translations(LANGUAGE.get()).ngettext(one, many, number)
 
 
@@ -74,7 +75,7 @@ def words_address(language: str) -> str:
 
 @router.get("/words/{language}.js")
 def words(language: str, request: Request) -> Response:
-    """Texts of a language, as a module for scripts."""
+    """Return the texts of a language as a JavaScript module. Raises `NotFound` for an unknown language."""
     if language not in LANGUAGES:
         raise NotFound("language", language, ", ".join(LANGUAGES))
     text = _words(language)
@@ -83,7 +84,9 @@ def words(language: str, request: Request) -> Response:
 
 @router.get("/language/{language}")
 def choose_language(language: str, request: Request) -> Response:
-    """Keep the choice of a language in a cookie, and go back to the page that asked."""
+    """Set the cookie with the chosen language, and redirect to the page that asked. Raises `NotFound` for an unknown
+    language.
+    """
     if language not in LANGUAGES:
         raise NotFound("language", language, ", ".join(LANGUAGES))
     back = request.query_params.get("back", "/")

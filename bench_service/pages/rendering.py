@@ -1,5 +1,6 @@
 """Rendering shared by all pages: templates, the filters in them, and the service behind the request."""
 
+import json
 import re
 from datetime import UTC, datetime
 from math import isfinite
@@ -13,6 +14,7 @@ from markupsafe import Markup, escape
 from bench_service.access.identity import Identity, Proof
 from bench_service.formats.printed import digits
 from bench_service.model.errors import ServiceError
+from bench_service.pages import figures
 from bench_service.pages.languages import (
     LANGUAGE,
     LANGUAGES,
@@ -32,6 +34,7 @@ def service_of(request: Request) -> BenchService:
 
 def _shell(request: Request) -> dict[str, Any]:
     """Frame of every page around its content. It needs no database: the stop stands on pages of errors, too."""
+    figures.expect()
     language = language_of(request)
     LANGUAGE.set(language)
     service = service_of(request)
@@ -39,14 +42,22 @@ def _shell(request: Request) -> dict[str, Any]:
         benches = list(service.benches.ids())
     except ServiceError:
         benches = [] if service.live.own is None else [service.live.own]
-    return {"language": language, "languages": LANGUAGES, "words": words_address(language), "stop_benches": benches}
+    titles = service.catalogue.titles()
+    return {
+        "language": language,
+        "languages": LANGUAGES,
+        "words": words_address(language),
+        "stop_benches": benches,
+        "titled": lambda name: translated(titles.get(name, name)),
+        "titles": json.dumps({name: translated(title) for name, title in titles.items()}, ensure_ascii=False),
+    }
 
 
 templates = Jinja2Templates(Path(__file__).parent / "templates", context_processors=[_shell])
 
 
 def number(value: Any) -> str:
-    """Format a cell for a reader: six significant digits, a dash for what is absent."""
+    """Return a table's cell as text: six significant digits, a dash for what is absent."""
     if value is None:
         return "–"
     if isinstance(value, bool):
@@ -55,7 +66,9 @@ def number(value: Any) -> str:
 
 
 def who(request: Request) -> dict[str, Any]:
-    """Describe the reader of a page: name and role, whether people log in here, and what changes must repeat."""
+    """Return facts about the reader of a page: name and role, whether people log in here, and the value that changes
+    must repeat.
+    """
     identity: Identity | None = getattr(request.state, "identity", None)
     log_in_on = service_of(request).access.book.log_in_on
     if identity is None:
@@ -66,14 +79,14 @@ def who(request: Request) -> dict[str, Any]:
 
 
 def measured(value: Any, uncertainty: Any) -> str:
-    """Format a value to the last digit that its standard uncertainty bears: two significant digits of it."""
+    """Return a value as text, to the last digit that its standard uncertainty bears: two significant digits of it."""
     if not _plain(value) or not _plain(uncertainty) or digits.places(uncertainty) is None:
         return number(value)
     return digits.to_uncertainty(value, uncertainty)
 
 
 def doubt(uncertainty: Any) -> str:
-    """Format a standard uncertainty: two significant digits."""
+    """Return a standard uncertainty as text of two significant digits."""
     if not _plain(uncertainty) or digits.places(uncertainty) is None:
         return number(uncertainty)
     return digits.two_digits(uncertainty)
@@ -84,7 +97,9 @@ def _plain(value: Any) -> bool:
 
 
 def moment(value: datetime | str | None) -> Markup | str:
-    """A moment as an element that a script shows in local time; without scripts it is UTC, and says so."""
+    """Return a moment as an HTML element that a script shows in local time; without scripts it shows UTC, and
+    says so.
+    """
     if not value:
         return "–"
     at = datetime.fromisoformat(value) if isinstance(value, str) else value
@@ -94,7 +109,7 @@ def moment(value: datetime | str | None) -> Markup | str:
 
 
 def duration(seconds: Any) -> str:
-    """Format a time span in the unit that fits it."""
+    """Return a time span as text, in the unit that fits it; a dash for None."""
     if not isinstance(seconds, int | float):
         return "–"
     if seconds < 120:
@@ -106,12 +121,12 @@ _TIMES = re.compile(r"[^0-9a-f]")
 
 
 def short(identity: str) -> str:
-    """Short name of a thing for a person: the last six characters of its id, which chance made."""
+    """Return the short name of a thing for a person: the last six characters of its id, which are random."""
     return _TIMES.sub("", identity)[-6:]
 
 
 def words_of(value: Any) -> Markup:
-    """Readable text of a parameter: numbers as they are, lists and objects line by line, no Python notation."""
+    """Return a parameter as readable text: numbers as they are, lists and objects line by line, no Python notation."""
     if isinstance(value, dict):
         rows = (f"{escape(k)}: {words_of(v)}" for k, v in value.items())
         return Markup("; ").join(Markup(row) for row in rows) if value else Markup("–")

@@ -1,17 +1,20 @@
 """Routes of the HTML pages: benches with their activity, jobs, results, units."""
 
+from contextlib import suppress
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.formats.calibration_exports.forms import CalibrationForm
 from bench_service.jobs.numbers import job_id_of
+from bench_service.model.errors import NotFound
 from bench_service.model.job import FINAL, Event, Job, JobState
 from bench_service.model.records import StoredResult
 from bench_service.pages.corrections import correction_table
 from bench_service.pages.images import SHELF
 from bench_service.pages.rendering import service_of, templates
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
@@ -19,10 +22,12 @@ from procedures.core.report import Figure
 from procedures.core.unit import Unit
 from procedures.core.units import DISPLAY, NOISE_DISPLAY
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 SHOWN_EVENTS = 300
 """Number of a job's latest events that its page lists."""
+SHOWN_SOURCES = 20
+"""Number of an analysis's recordings that its page lists by name."""
 _VERBS = {
     JobState.QUEUED: (("pause", "Pause"), ("cancel", "Cancel")),
     JobState.RUNNING: (("pause", "Pause"), ("cancel", "Cancel")),
@@ -50,7 +55,21 @@ def _reported(service: BenchService, result: StoredResult) -> dict[str, Any]:
             )
         else:
             sections.append({"table": section})
-    return {"result": result, "report": report, "sections": sections}
+    return {"result": result, "report": report, "sections": sections, "sources": _sources(service, result)}
+
+
+def _sources(service: BenchService, result: StoredResult) -> list[dict[str, str]]:
+    """Recordings of an analysis by the numbers that its report gives them, with their names; none of a job's result."""
+    if result.job_id is not None:
+        return []
+    sources: list[dict[str, str]] = []
+    for recording_id, _ in result.recordings[:SHOWN_SOURCES]:
+        with suppress(NotFound):  # removed since
+            stored = service.stores.recordings.get(recording_id)
+            station, files = stored.info.station, stored.source.get("files") or ({},)
+            name = f"{station.index}: {station.label}" if station else files[0].get("name", "")
+            sources.append({"id": recording_id, "name": name})
+    return sources
 
 
 def _noise_rows(unit: Unit) -> list[list[str]]:
@@ -107,9 +126,11 @@ def _notes(events: tuple[Event, ...]) -> list[dict[str, Any]]:
 
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
-    """Page of the benches, their units and the latest jobs."""
+    """Return the HTML page of the benches, their units and the latest jobs."""
     service = service_of(request)
     queued = service.stores.queue.lengths()
+    units = service.stores.units.units()
+    testable = service.benches.testable(unit.serial for unit in units)
     return _page(
         request,
         "home.html",
@@ -125,18 +146,23 @@ def home(request: Request) -> HTMLResponse:
             for bench_id in service.benches.ids()
         ],
         jobs=service.stores.jobs.list(limit=20).items,
-        units=service.stores.units.units(),
+        units=sorted(units, key=lambda unit: unit.serial not in testable),
+        testable=testable,
     )
 
 
 @router.get("/jobs/{job_id}")
 def job_page(job_id: str, request: Request) -> HTMLResponse:
-    """Page of a job: progress, stations, recordings, and its result once there is one."""
+    """Return the HTML page of a job: progress, stations, recordings, and its result once there is one. Raises
+    `NotFound`.
+    """
     service = service_of(request)
     job_id = job_id_of(service.stores, job_id)
     last_event, _ = service.stores.jobs.last_event(job_id)  # before the job: what comes later reloads the page
     job = service.stores.jobs.get(job_id)
     live = service.live.of_job(job)
+    with suppress(NotFound):  # left out of the catalogue: the page shows its name
+        service.catalogue.procedure(job.procedure)
     stations = max(1, len(job.stations))
     result = service.stores.results.get(job.result_id) if job.result_id else None
     events = service.stores.jobs.events(job_id, max(0, last_event - SHOWN_EVENTS), SHOWN_EVENTS)
@@ -160,7 +186,7 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/results/{result_id}")
 def result_page(result_id: str, request: Request) -> HTMLResponse:
-    """Page of a result: verdict, checks, tables, plots, lineage."""
+    """Return the HTML page of a result: verdict, checks, tables, plots, lineage. Raises `NotFound`."""
     service = service_of(request)
     result = service.stores.results.get(result_id)
     numbers = service.stores.jobs.numbers([result.job_id] if result.job_id else [])
@@ -169,13 +195,14 @@ def result_page(result_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/units/{serial}")
 def unit_page(serial: str, request: Request) -> HTMLResponse:
-    """Page of a unit: its record, its calibrations and its correction sets."""
+    """Return the HTML page of a unit: its record, its calibrations and its correction sets. Raises `NotFound`."""
     service = service_of(request)
     unit = service.stores.units.unit(serial)
     return _page(
         request,
         "unit.html",
         unit=unit,
+        testable=serial in service.benches.testable([serial]),
         noise=_noise_rows(unit),
         calibrations=service.stores.calibrations.list(serial).items,
         corrections=[(c, correction_table(c.correction)) for c in service.stores.corrections.list(serial).items],

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 
 from bench_service.model.errors import NotFound
 from bench_service.pages.caching import FOR_GOOD, kept
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False)
+router = Routes(include_in_schema=False)
 
 MEDIA_TYPES = {"css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
 OF_PACKAGE = {
@@ -28,7 +29,7 @@ OF_PACKAGE = {
 
 @dataclass(frozen=True)
 class StaticFile:
-    """A static file with its content and media type."""
+    """A static file with its content, media type and version (a hash)."""
 
     content: bytes
     media_type: str
@@ -37,14 +38,14 @@ class StaticFile:
 
 @cache
 def own() -> frozenset[str]:
-    """Names of the service's own static files."""
+    """Return the names of the service's own static files."""
     folder = files("bench_service.pages") / "static"
     return frozenset(file.name for file in folder.iterdir() if file.name.rpartition(".")[2] in MEDIA_TYPES)
 
 
 @cache
 def static_file(name: str) -> StaticFile:
-    """Find a file by its name. Raises `NotFound`."""
+    """Return the static file of that name, own or of a package. Raises `NotFound`."""
     if name in own():
         place = files("bench_service.pages") / "static"
     elif name in OF_PACKAGE:
@@ -58,7 +59,7 @@ def static_file(name: str) -> StaticFile:
 
 @cache
 def release() -> str:
-    """Version of all own scripts and style sheets together."""
+    """Return the version of all own scripts and style sheets together, a hash of their contents."""
     known = "".join(name + static_file(name).version for name in sorted(own()))
     return hashlib.sha256(known.encode()).hexdigest()[:16]
 
@@ -75,14 +76,16 @@ def module(name: str) -> str:
 
 @router.get("/static/{name}")
 def read_static(name: str, request: Request) -> Response:
-    """A script or a style sheet."""
+    """Return a script or a style sheet by its name. Raises `NotFound`."""
     file = static_file(name)
     return kept(request, file.version, file.media_type, lambda: file.content)
 
 
 @router.get("/static/{version}/{name}")
 def read_static_of_release(version: str, name: str, request: Request) -> Response:
-    """A script or a style sheet under the address of a release; of another release it is not kept."""
+    """Return a script or a style sheet under the address of a release; of another release the browser does not keep it.
+    Raises `NotFound`.
+    """
     file = static_file(name)
     answer = kept(request, file.version, file.media_type, lambda: file.content)
     if version == release():

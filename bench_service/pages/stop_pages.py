@@ -4,13 +4,14 @@ from json import JSONDecodeError
 from typing import Annotated, Any
 from urllib.parse import quote
 
-from fastapi import APIRouter, Form, Request
+from fastapi import Form, Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.pages.in_process import ask
 from bench_service.pages.rendering import service_of, templates
+from bench_service.routing import Routes
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.post("/benches/{bench_id}/stop")
@@ -20,7 +21,9 @@ async def stop_by_form(
     reason: Annotated[str, Form(max_length=500)] = "",
     by: Annotated[str, Form(max_length=200)] = "",
 ) -> HTMLResponse:
-    """Stop a bench from a page whose scripts do not run; the answer says whether it arrived and what is safe."""
+    """Stop a bench from a page whose scripts do not run, and return a page that says whether the stop arrived and what
+    is safe.
+    """
     given = {"reason": reason or "stop pressed on a page without scripts", "by": by}
     sent = {name: value for name, value in given.items() if value}
     answer = await ask(request, "POST", f"/api/v1/benches/{quote(bench_id, safe='')}/stop", sent)
@@ -34,7 +37,7 @@ async def stop_by_form(
 
 @router.get("/benches/{bench_id}/stops")
 def stops_page(bench_id: str, request: Request, after: str | None = None) -> HTMLResponse:
-    """Page of a bench's stops, newest first: each with author, reason, release and remark."""
+    """Return the HTML page of a bench's stops, newest first: each with author, reason, release and remark."""
     service = service_of(request)
     service.benches.description(bench_id)
     page = service.stores.benches.stops(bench_id, after=after)

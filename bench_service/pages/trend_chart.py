@@ -1,4 +1,4 @@
-"""Chart of a quantity of a unit over its results. Knows how it is drawn; must not know which page shows it."""
+"""Chart of a quantity of a unit over its results, for pages and images."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,7 +14,7 @@ from procedures.core.units import DISPLAY
 
 @dataclass(frozen=True)
 class WantedTrend:
-    """Choice of a quantity, as the address of its page has it."""
+    """Choice of a quantity as the query of a page's address has it."""
 
     procedure: Annotated[str, Query(max_length=100)] = "calibration_12_orientations"
     quantity: Annotated[str, Query(max_length=200)] = ""
@@ -27,7 +27,7 @@ TrendQuery = Annotated[WantedTrend, Depends(WantedTrend)]
 
 @dataclass(frozen=True)
 class TrendChoice:
-    """A quantity that exists, and the others of the same result."""
+    """A quantity that exists, with the names of the others of the same result."""
 
     quantity: str
     names: tuple[str, ...]
@@ -37,14 +37,14 @@ class TrendChoice:
 
 @dataclass(frozen=True)
 class TrendChart:
-    """A trend and its figure; None where no result has the quantity."""
+    """A trend with its figure; both None where no result has the quantity."""
 
     trend: Trend | None
     figure: Figure | None
 
 
 def wanted_trend(service: BenchService, serial: str, query: WantedTrend) -> TrendChoice:
-    """Choose the requested quantity, or else the first of the newest result. Raises `NotFound` for no such unit."""
+    """Return the requested quantity, or else the first of the newest result. Raises `NotFound` for an unknown unit."""
     service.stores.units.unit(serial)
     kind = service.benches.description(service.benches.default()).simulated
     simulated = kind if query.simulated is None else query.simulated
@@ -54,7 +54,7 @@ def wanted_trend(service: BenchService, serial: str, query: WantedTrend) -> Tren
 
 
 def trend_of(service: BenchService, serial: str, choice: TrendChoice) -> TrendChart:
-    """The trend of a quantity, with its figure."""
+    """Return the trend of a chosen quantity, with its figure."""
     if not choice.quantity:
         return TrendChart(None, None)
     query = choice.query
@@ -63,7 +63,9 @@ def trend_of(service: BenchService, serial: str, choice: TrendChoice) -> TrendCh
 
 
 def trend_figure(trend: Trend) -> Figure | None:
-    """Draw values with their uncertainty, centre, limits, and the points that break a rule; None without points."""
+    """Return the figure of values with their uncertainty, centre, limits, and the points that break a rule; None
+    without points.
+    """
     if not trend.points:
         return None
     unit, size = DISPLAY.get(trend.unit, (trend.unit, 1.0))

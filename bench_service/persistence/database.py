@@ -51,7 +51,7 @@ _JSON: dict[str, Any] = {
 
 
 class Conflict(StorageFailure):
-    """A row contradicts another one: a key that exists already, or a reference to nothing."""
+    """Raised where a row contradicts another one: a key that exists already, or a reference to nothing."""
 
 
 class Database:
@@ -66,7 +66,9 @@ class Database:
 
     @contextmanager
     def read(self) -> Generator[Session, None, None]:
-        """Open a reading transaction. On SQLite all its reads see one moment; on Postgres each statement its own."""
+        """Open a reading transaction and give its session. On SQLite all its reads see one moment; on Postgres each
+        statement its own.
+        """
         self.require_file()
         with storage_errors(), Session(self._reading_engine) as session:
             yield session
@@ -95,7 +97,9 @@ class Database:
 
     @contextmanager
     def write_connection(self) -> Generator[Connection, None, None]:
-        """Open a writing transaction below the tables, for migrations."""
+        """Open a writing transaction below the tables, for migrations, and give its connection. Raises
+        `StorageFailure`.
+        """
         with storage_errors(), self._writing_engine.begin() as connection:
             yield connection
 
@@ -109,11 +113,13 @@ class Database:
             session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
 
     def turn_at_bench(self, session: Session, bench_id: str) -> None:
-        """Wait for one's turn at a bench: whoever claims a job of it, reserves it or changes what is mounted there."""
+        """Wait for a turn at a bench until the transaction ends: claims of its jobs, reservations and mountings take
+        turns.
+        """
         self.one_at_a_time(session, f"claim a job of bench {bench_id}")
 
     def free_bytes(self) -> int | None:
-        """Free space on the disk of an SQLite file [bytes]; None where the database is elsewhere."""
+        """Return the free space on the disk of an SQLite file [bytes]; None where the database is elsewhere."""
         file = self.engine.url.database
         return None if self.is_postgres or not file else shutil.disk_usage(Path(file).parent).free
 
@@ -149,7 +155,9 @@ def announce(session: Session, subject: str) -> None:
 
 
 def missing_file(database_url: str) -> Path | None:
-    """The file of an SQLite database that is not there, and that opening it would make; None for every other one."""
+    """Return the file of an SQLite database that is not there, and that opening it would make; None for every other
+    one.
+    """
     url = make_url(database_url)
     if url.get_backend_name() != "sqlite" or url.database in (None, "", ":memory:"):
         return None
@@ -249,8 +257,9 @@ def storage_errors() -> Generator[None, None, None]:
 
 
 def as_storage_error(error: Exception) -> Exception:
-    """An error of a database or its driver that others met, as `StorageFull`, `Conflict` or `StorageFailure`; any other
-    error as it is."""
+    """Return an error of a database or its driver that others met as `StorageFull`, `Conflict` or `StorageFailure`; any
+    other error as it is.
+    """
     if not isinstance(error, (SQLAlchemyError, sqlite3.Error)):
         return error
     try:

@@ -41,7 +41,7 @@ def unix_epoch(modifier: str) -> float:
 
 
 def engine_database(database_url: str, bench_id: str) -> tuple[str, dict[str, Any]]:
-    """URL and connection options of the database of a bench's engine. An SQLite file is switched to WAL here."""
+    """Return URL and connection options of the database of a bench's engine. An SQLite file is switched to WAL here."""
     if make_url(database_url).get_backend_name() != "sqlite":
         return database_url, {"connect_args": {**TCP, "application_name": f"bench {bench_id} engine"[:63]}}
     beside = f"{database_url}.{bench_id}.jobs"

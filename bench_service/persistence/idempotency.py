@@ -13,12 +13,12 @@ from bench_service.persistence.tables.jobs import IdempotencyKeyRow
 
 T = TypeVar("T")
 
-_RIVALS = 32
-"""Number of retries after conflicts: each means that a rival committed, so up to this many rivals are survived."""
+_MOST_RETRIES = 32
+"""Maximum number of retries after conflicts; each conflict means that a concurrent transaction committed first."""
 
 
 class SqlKeyStore:
-    """SQL implementation of `bench_service.jobs.stores.KeyStore`."""
+    """SQL implementation of `bench_service.evidence.keys.KeyStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -43,7 +43,9 @@ def made_before(session: Session, idempotency: Idempotency | None, kind: str) ->
 
 
 def remember(session: Session, idempotency: Idempotency | None, kind: str, made_id: str, at: datetime) -> None:
-    """Store the key with its object's id; a rival with the same key waits here, and then fails with `Conflict`."""
+    """Store the key with its object's id. A concurrent transaction with the same key waits here, and then fails with
+    `Conflict`.
+    """
     if idempotency is not None:
         session.add(
             IdempotencyKeyRow(
@@ -54,8 +56,10 @@ def remember(session: Session, idempotency: Idempotency | None, kind: str, made_
 
 
 def again_after_conflict(work: Callable[[], T]) -> T:
-    """Retry a transaction after each conflict; the retry sees the row that the rival made."""
-    for _ in range(_RIVALS):
+    """Retry a transaction after each conflict, up to 32 times, and return its result. The retry sees the row that the
+    concurrent transaction stored.
+    """
+    for _ in range(_MOST_RETRIES):
         try:
             return work()
         except Conflict:

@@ -25,7 +25,8 @@ def page(
     item: Callable[[R], T | None],
     either: Sequence[ColumnElement[bool]] | None = None,
 ) -> Page[T]:
-    """The next `limit` rows older than `after`, each made an item; one of which none can be made is left out.
+    """Return the next `limit` rows older than the id `after`, each converted to an item; a row that cannot be converted
+    is left out.
 
     `either`: conditions of which at least one must hold, each found by an index of its own; None: no such condition.
     """

@@ -1,4 +1,4 @@
-"""Long lists in parts: a statement holds only so many values."""
+"""Splitting of long lists for SQL: a statement holds only so many values."""
 
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
@@ -10,5 +10,5 @@ AT_ONCE = 500
 
 
 def in_parts(items: Sequence[T]) -> Iterator[Sequence[T]]:
-    """The items in order, `AT_ONCE` together."""
+    """Yield the items in order, in slices of at most `AT_ONCE`."""
     return (items[first : first + AT_ONCE] for first in range(0, len(items), AT_ONCE))

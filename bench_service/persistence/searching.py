@@ -19,7 +19,7 @@ CLOCK_DIFFERS = timedelta(hours=1)
 
 
 def find_jobs(query: S, search: Search) -> S:
-    """Restrict a query of jobs."""
+    """Return a query of jobs restricted by a search, except for its text."""
     query = _made(query, JobRow.id, JobRow.created_at, search)
     if search.verdict is not None:
         query = query.where(JobRow.verdict == search.verdict.value)
@@ -27,7 +27,7 @@ def find_jobs(query: S, search: Search) -> S:
 
 
 def find_recordings(query: S, search: Search) -> S:
-    """Restrict a query of recordings; verdict and labels are those of the job that recorded."""
+    """Return a query of recordings restricted by a search; verdict and labels are those of the job that recorded."""
     query = _made(query, RecordingRow.id, RecordingRow.created_at, search)
     job = RecordingRow.job_id == JobRow.id
     if search.verdict is not None:
@@ -36,7 +36,7 @@ def find_recordings(query: S, search: Search) -> S:
 
 
 def find_results(query: S, search: Search) -> S:
-    """Restrict a query of results; labels are those of the job whose recordings were analysed."""
+    """Return a query of results restricted by a search; labels are those of the job whose recordings were analysed."""
     query = _made(query, ResultRow.id, ResultRow.created_at, search)
     if search.verdict is not None:
         query = query.where(ResultRow.verdict == search.verdict.value)

@@ -50,7 +50,7 @@ def open_stores(database_url: str, copies: Path | None = None) -> tuple[Stores, 
 
 
 def stores_of(database: Database) -> Stores:
-    """Build the stores of a database that is in the newest form."""
+    """Return the stores of a database that is in the newest form."""
     return Stores(
         jobs=SqlJobStore(database),
         queue=SqlQueueStore(database),

@@ -39,20 +39,22 @@ _Column = InstrumentedAttribute[Any]
 
 
 class ImportedNames(FunctionElement[Any]):
-    """Names of the files in the `source` of an import, as rows."""
+    """SQL function with the names of the files in the `source` of an import, as rows."""
 
     name = "imported_names"
     inherit_cache = True
 
 
 def ways_to_jobs(session: Session, text: str) -> Ways:
-    """Conditions of jobs, at least one of which holds where a job has the text."""
+    """Return conditions of jobs, at least one of which holds where a job has the text."""
     named = (JobRow.procedure, JobRow.unit, JobRow.bench, JobRow.requested_by)
     return (*_in_columns(session, named, text), *_in_ids(JobRow.id, text), *_in_job(session, JobRow.id, text))
 
 
 def ways_to_recordings(session: Session, text: str) -> Ways:
-    """Conditions of recordings, at least one of which holds where a recording or its job's labels have the text."""
+    """Return conditions of recordings, at least one of which holds where a recording or its job's labels have the
+    text.
+    """
     label = _in_column(session, RecordingRow.station_label, text, is_short(RecordingRow.station_label))
     names = _imported_name_holds(text)
     by_row = (
@@ -72,7 +74,7 @@ def ways_to_recordings(session: Session, text: str) -> Ways:
 
 
 def ways_to_results(session: Session, text: str) -> Ways:
-    """Conditions of results, at least one of which holds where a result or its job's labels have the text."""
+    """Return conditions of results, at least one of which holds where a result or its job's labels have the text."""
     of_job = tuple(ResultRow.job_id.in_(select(JobRow.id).where(way)) for way in _in_ids(JobRow.id, text))
     return (
         *_in_columns(session, (ResultRow.name, ResultRow.unit), text),

@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class AuditEntry:
-    """One act in the audit trail."""
+    """One act in the audit trail: when, who, which action on what target, with which outcome."""
 
     id: str
     at: datetime
@@ -36,33 +36,32 @@ class AuditEntry:
 
 
 class AuditTrail(Protocol):
-    """PORT of memory: the audit trail."""
+    """Store of the audit trail: entries are added, and never changed. Interface; the SQL is in `persistence`."""
 
     def add(self, entry: AuditEntry) -> None:
         """Add an entry to the trail. Raises `StorageFull`, `StorageFailure`."""
         ...
 
     def add_once(self, entry: AuditEntry) -> bool:
-        """Add an entry unless the trail has one of its id; True where it was added. Raises as `add` does."""
+        """Add an entry unless the trail has one of its id; return True where it was added. Raises as `add` does."""
         ...
 
     def list(
         self, *, who: str | None = None, target: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[AuditEntry]:
-        """List entries, newest first; `target` is a path or one of its parts, such as an id."""
+        """Return one page of entries, newest first; `target` is a path or one of its parts, such as an id."""
         ...
 
     def verify(self, expected: str | None = None) -> ChainReport:
-        """Check every entry and checkpoint of the chain, and that one has the `expected` digest.
-
+        """Check every entry and checkpoint of the chain, and that one has the `expected` digest; return the report.
         Raises `StorageFailure`.
         """
         ...
 
     def close(self, before: datetime, by: str, at: datetime) -> tuple[Checkpoint, ...]:
-        """Remove the entries before a moment, and leave a checkpoint for each stretch that was removed.
+        """Remove the entries before a moment, and return the checkpoints that take the place of the removed stretches.
 
-        Raises `IllegalTransition` where the chain is broken there: what is wrong must be looked at first.
+        Raises `IllegalTransition` where the chain is broken there: a person must look at that first.
         """
         ...
 

@@ -22,7 +22,7 @@ MOST_FAULTS = 20
 
 @dataclass(frozen=True)
 class Link:
-    """One entry as the chain has it: exactly what is stored."""
+    """One stored entry of the audit trail as the hash chain sees it, with its sequence and digest."""
 
     sequence: int
     id: str
@@ -44,7 +44,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A closed stretch of the chain, whose entries were removed."""
+    """A closed stretch of the chain, whose entries were removed: their range, times and digests."""
 
     first: int
     last: int
@@ -60,7 +60,7 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class ChainReport:
-    """The outcome of a check of the whole chain."""
+    """Outcome of a check of the whole chain: numbers of entries and checkpoints, last digest, and faults."""
 
     entries: int
     checkpoints: tuple[Checkpoint, ...]
@@ -72,13 +72,13 @@ class ChainReport:
 
     @property
     def whole(self) -> bool:
-        """Return whether nothing was changed, removed or put in between."""
+        """True where nothing was changed, removed or put in between."""
         return not self.faults
 
 
 @dataclass
 class ChainCheck:
-    """The check of a chain, entry by entry, in order."""
+    """Running check of a chain: it takes checkpoints, then entries in order, and collects the faults."""
 
     sequence: int = 0
     digest: str = BEGINNING
@@ -98,7 +98,7 @@ class ChainCheck:
             self._go_on(one.last, one.digest)
 
     def pass_link(self, link: Link) -> None:
-        """Check the next entry."""
+        """Check that the next entry follows the one before, by sequence and digest; a fault is kept."""
         self.entries += 1
         if link.sequence != self.sequence + 1:
             missing = f"entry {self.sequence + 1}" if link.sequence == self.sequence + 2 else "entries"
@@ -114,12 +114,12 @@ class ChainCheck:
         self.met = self.met or digest == self.expected
 
     def strangers(self, number: int) -> None:
-        """Note entries without a place in the chain."""
+        """Record as a fault that `number` entries have no place in the chain."""
         if number:
             self._fault(f"{number} entries have no place in the chain: they were not written by the service")
 
     def report(self) -> ChainReport:
-        """The outcome so far."""
+        """Return the outcome of the check so far."""
         if self.expected is not None and not self.met:
             self._fault(f"no entry has the digest {self.expected}: entries are missing, or all were chained anew")
         return ChainReport(self.entries, self.checkpoints, self.sequence, self.digest, tuple(self.faults))

@@ -1,4 +1,6 @@
-"""Retention of the audit trail: entries that are older go, stretch by stretch, and leave checkpoints."""
+"""Retention of the audit trail: entries older than the setting `audit_days` are removed, stretch by stretch, and leave
+checkpoints.
+"""
 
 import logging
 from contextlib import ExitStack
@@ -20,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 class AuditRetention:
-    """Closes stretches of one trail, in a thread of its own, at start and every hour."""
+    """Thread that removes old stretches of one audit trail, at start and every hour."""
 
     def __init__(self, trail: AuditTrail, kept: timedelta) -> None:
         """Set up with `kept`: the time for which an entry is kept."""
@@ -30,16 +32,18 @@ class AuditRetention:
         self._thread = Thread(target=self._run, name="audit retention", daemon=True)
 
     def begin(self) -> None:
-        """Begin to look."""
+        """Start the thread of the retention."""
         self._thread.start()
 
     def end(self) -> None:
-        """End the thread; one that hangs in the database is left."""
+        """End the thread and wait for it, within a limit; one that hangs in the database is left."""
         self._ending.set()
         self._thread.join(LEAVE_S)
 
     def look(self) -> int:
-        """Close what is older, and note that in the trail; return the number of stretches. Never raises for storage."""
+        """Remove entries that are old enough, add an entry about that, and return the number of stretches. Never raises
+        for storage.
+        """
         at = now()
         try:
             closed = self._trail.close(at - self._kept, BY, at)
@@ -62,7 +66,7 @@ class AuditRetention:
 
 
 def begin_retention(trail: AuditTrail, kept: timedelta, closing: ExitStack) -> None:
-    """Begin to close stretches of a trail; `closing` ends it."""
+    """Start the retention of a trail, of entries older than `kept`; `closing` ends it."""
     retention = AuditRetention(trail, kept)
     retention.begin()
     closing.callback(retention.end)

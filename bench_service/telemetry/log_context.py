@@ -23,12 +23,12 @@ def about(**subjects: str | None) -> Generator[None]:
 
 
 def subjects() -> dict[str, str]:
-    """The subjects of lines logged here and now."""
+    """Return the subjects of lines logged here and now, as name -> text."""
     return dict(_ABOUT.get() or {})
 
 
 def request_id() -> str:
-    """Id of the request that is being answered; empty outside of requests."""
+    """Return the id of the request that is being answered; empty outside of requests."""
     return (_ABOUT.get() or {}).get("request", "")
 
 

@@ -10,10 +10,10 @@ _TOKEN = re.compile(rf"{PREFIX}[A-Za-z0-9_-]{{{SECRET_LENGTH}}}")
 
 
 def names_token(text: str) -> bool:
-    """Return whether a text contains a token."""
+    """Return whether a text contains something in the form of an access token."""
     return _TOKEN.search(text) is not None
 
 
 def without_tokens(text: str) -> str:
-    """Replace every token in a text: for log lines, traces and the audit trail."""
+    """Return a text with every access token in it replaced: for log lines, traces and the audit trail."""
     return _TOKEN.sub(f"{PREFIX}[hidden]", text)

@@ -1,4 +1,4 @@
-"""Stores of the telemetry room: the audit trail, the counts that a monitor reads, and the reports of upkeep."""
+"""Stores that `telemetry` needs: the audit trail, the counts that a monitor reads, and the reports of upkeep."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from bench_service.telemetry.upkeep import UpkeepStore
 
 @dataclass(frozen=True)
 class TelemetryStores:
-    """The stores that record what the service itself did."""
+    """The stores of what the service itself did, as one value: audit trail, counts, reports of upkeep."""
 
     audit: AuditTrail
     tallies: TallyStore

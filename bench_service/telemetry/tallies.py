@@ -31,7 +31,7 @@ DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 
 
 @dataclass(frozen=True)
 class Ending:
-    """A job that has ended, as a row of the tally."""
+    """A job that has ended, as a row of the tally: procedure, state, verdict, times."""
 
     id: str
     procedure: str
@@ -44,28 +44,28 @@ class Ending:
 
 
 class TallyStore(Protocol):
-    """PORT of memory: the rows that are counted."""
+    """Reader of the rows that are counted for metrics. Interface; the SQL is in `persistence`."""
 
     def endings(self, since: datetime | None, after: str, limit: int) -> tuple[Ending, ...]:
-        """Jobs that ended at `since` with a greater id than `after`, or later; in that order."""
+        """Return at most `limit` jobs that ended at `since` with a greater id than `after`, or later; in that order."""
         ...
 
     def stations_of_open_jobs(self) -> Mapping[str, int]:
-        """Number of stations done by id of each job that has not ended and has done any."""
+        """Return the number of stations done, by id of each job that has not ended and has done any."""
         ...
 
     def recorded_bytes(self) -> int:
-        """Stored bytes of all recordings that are listed."""
+        """Return the stored bytes of all recordings that are listed."""
         ...
 
     def free_bytes(self) -> int | None:
-        """Free bytes on the disk of the database's file; None for a database of another machine."""
+        """Return the free bytes on the disk of the database's file; None for a database of another machine."""
         ...
 
 
 @dataclass
 class Spread:
-    """A histogram of durations."""
+    """Histogram of durations in the classes of `DURATION_S`, with their sum [s]."""
 
     counts: list[int] = field(default_factory=lambda: [0] * (len(DURATION_S) + 1))
     sum_s: float = 0.0
@@ -77,7 +77,7 @@ class Spread:
 
 
 class Tallies:
-    """The counts of this process, updated at each scrape."""
+    """Counts of ended jobs for the metrics of this process, updated at each scrape from the jobs that ended since."""
 
     def __init__(self, store: TallyStore) -> None:
         self.store = store
@@ -104,7 +104,7 @@ class Tallies:
         self._newest: datetime | None = None
 
     def update(self) -> None:
-        """Count the jobs that ended since. Raises `StorageFailure`."""
+        """Count the jobs that ended since the last call. Raises `StorageFailure`."""
         with self._lock:
             at = now()
             if self._newest is not None and at < self._newest - OVERLAP:
@@ -127,7 +127,9 @@ class Tallies:
         return self._ended_stations - resumed + sum(still.values())
 
     def ended(self) -> dict[JobState, int]:
-        """Number of jobs in each state that is never left, as tallied: the database counts longer with the history."""
+        """Return the number of jobs in each state that is never left, as tallied: the database counts longer with the
+        history.
+        """
         found = Counter[str]()
         for (_, state, _), count in self.finished.items():
             found[state] += count

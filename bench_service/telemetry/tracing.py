@@ -23,21 +23,23 @@ Found = dict[str, str | int | float | bool]
 
 
 class Traces:
-    """Traces that go nowhere: a service's default unless a collector is configured."""
+    """Traces that go nowhere: the service's default unless a collector is configured. Base of `CollectedTraces`."""
 
     @contextmanager
     def part(self, job_id: str, name: str, **known: str | int | float | bool) -> Generator[Found]:
-        """Trace a part of a job while it runs; put its findings into the dictionary."""
+        """Trace a part of a job while the block runs; what the block puts into the dictionary becomes attributes of the
+        span.
+        """
         yield {}
 
     def ended(self, job: Job) -> None:
         """Write the span of a job that has ended, or was paused."""
 
     def instrument(self, app: Any) -> None:
-        """Make every request to this application a span."""
+        """Have every request to this application traced as a span."""
 
     def close(self) -> None:
-        """Send the waiting spans; takes at most `TIMEOUT_S`."""
+        """Send the waiting spans and wait, at most `TIMEOUT_S`."""
 
 
 class CollectedTraces(Traces):
@@ -109,7 +111,7 @@ def _hide_tokens(span: Any, _scope: Any) -> None:
 
 
 def traces_to(url: str | None, bench_id: str, code_version: str) -> Traces:
-    """Traces to a collector, or none where there is no address."""
+    """Return traces that go to a collector's address, or nowhere where `url` is None."""
     return Traces() if url is None else CollectedTraces(url, bench_id, code_version)
 
 

@@ -1,4 +1,6 @@
-"""Upkeep of the database: reports of checks and copies, and the PORT that remembers them."""
+"""Upkeep of the database: reports of checks and copies, the interface of their store, and that of the database as a
+whole.
+"""
 
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -9,7 +11,7 @@ from bench_service.model.records import Page
 
 
 class UpkeepKind(StrEnum):
-    """Kinds of upkeep that are reported."""
+    """Kinds of upkeep that are reported: check of the contents, copy, retention of raw data."""
 
     SCRUB = "scrub"
     """A check of the database's integrity and of every stored chunk against its hash."""
@@ -23,7 +25,7 @@ class UpkeepKind(StrEnum):
 
 @dataclass(frozen=True)
 class UpkeepReport:
-    """One piece of upkeep and its outcome."""
+    """One piece of upkeep of the database, with its times, its outcome and a document of details."""
 
     id: str
     kind: UpkeepKind
@@ -38,10 +40,12 @@ class UpkeepReport:
 
 
 class UpkeepStore(Protocol):
-    """Reports of upkeep. Every method is one transaction."""
+    """Store of the reports of upkeep. Every method is one transaction. Interface; the SQL is in `persistence`."""
 
     def begin(self, report: UpkeepReport, unless_since: datetime | None = None) -> bool:
-        """Add a report that has not ended; with `unless_since` only where no other of its kind began since then."""
+        """Store a report that has not ended, and return True; with `unless_since` only where no other of its kind began
+        since then.
+        """
         ...
 
     def end(self, report: UpkeepReport) -> None:
@@ -49,17 +53,17 @@ class UpkeepStore(Protocol):
         ...
 
     def last(self, kind: UpkeepKind) -> UpkeepReport | None:
-        """Return the latest report of a kind that has ended."""
+        """Return the latest report of a kind that has ended; None where there is none."""
         ...
 
     def list(self, *, kind: UpkeepKind | None = None, after: str | None = None, limit: int = 50) -> Page[UpkeepReport]:
-        """List reports, newest first."""
+        """Return one page of reports, of one kind or all, newest first."""
         ...
 
 
 @dataclass(frozen=True)
 class DatabaseSize:
-    """The size of a database."""
+    """Size of a database and of its log, free space on its disk [bytes], and its revision."""
 
     kind: str
     """"sqlite" or "postgresql"."""
@@ -75,14 +79,16 @@ class DatabaseSize:
 
 
 class DatabasePort(Protocol):
-    """PORT: the database as a whole."""
+    """The database as a whole: its size and its faults. Interface; see `persistence/upkeep/contents.py`."""
 
     def size(self) -> DatabaseSize:
-        """Read the size of the database. Raises `StorageFailure`."""
+        """Return the size of the database. Raises `StorageFailure`."""
         ...
 
     def faults(self) -> tuple[str, ...]:
-        """Return what the database itself finds wrong with its pages and references; it may take minutes."""
+        """Return faults that the database itself finds in its pages and references, a sentence each; it may take
+        minutes.
+        """
         ...
 
     def trouble(self) -> str | None:

@@ -58,7 +58,7 @@ class Client:
         self.close()
 
     def close(self) -> None:
-        """Close the connections."""
+        """Close the connections to the service."""
         self._http.close()
 
     def procedures(self) -> dict[str, dict[str, Any]]:
@@ -68,7 +68,7 @@ class Client:
     def preview(
         self, procedure: str, unit: str, parameters: Mapping[str, Any] | None = None, bench: str | None = None
     ) -> Preview:
-        """Preview a plan; nothing moves."""
+        """Return the preview of a plan; nothing moves. Raises `Refused`, `Unavailable`."""
         body = {"unit": unit, "bench": bench, "parameters": dict(parameters or {})}
         path = f"/api/v1/procedures/{quote(procedure, safe='')}/preview"
         return Preview.model_validate(self._transport.post(path, once=False, json=body))
@@ -89,7 +89,9 @@ class Client:
         deadline_at: datetime | None = None,
         key: str | None = None,
     ) -> Job:
-        """Submit a job to the queue. Repeated with the same `key` and the same request it gives the same job."""
+        """Submit a job to the queue and return it. Repeated with the same `key` and the same request it returns the
+        same job. Raises `Refused`, `Unavailable`.
+        """
         terms = {"bench": bench, "priority": priority, "seed": seed, "retries": retries}
         terms |= {"reservation": reservation, "mounting": mounting}
         body = {
@@ -102,7 +104,7 @@ class Client:
         return Job.model_validate(made)
 
     def job(self, job_id: str) -> Job:
-        """Read one job."""
+        """Return one job as it is now. Raises `Refused` where there is none."""
         return Job.model_validate(self._transport.get(_path("jobs", job_id)))
 
     def jobs(self, **conditions: Any) -> Iterator[Job]:
@@ -136,30 +138,32 @@ class Client:
         return follow(self._transport, _id(job), after, self._patience_s)
 
     def cancel(self, job: Job | str) -> Job:
-        """Cancel a job; its recordings are kept."""
+        """Cancel a job and return it; its recordings are kept. Raises `Refused` where it has ended."""
         return self._ask(job, "cancel")
 
     def pause(self, job: Job | str) -> Job:
-        """Pause a job: a queued one at once, a running one before its next station."""
+        """Pause a job and return it: a queued one at once, a running one before its next station. Raises `Refused`."""
         return self._ask(job, "pause")
 
     def resume(self, job: Job | str) -> Job:
-        """Queue a paused or interrupted job again; it does the stations that remain."""
+        """Queue a paused or interrupted job again and return it; it does the stations that remain. Raises `Refused`."""
         return self._ask(job, "resume")
 
     def answer(self, job: Job | str, done: bool, remark: str = "") -> Job:
-        """Answer what a job asks of the person at the bench."""
+        """Answer the job's prompt to the person at the bench, and return the job. Raises `Refused` where there is
+        none.
+        """
         return self._ask(job, "answer", {"done": done, "remark": remark})
 
     def result_of(self, job: Job | str) -> Result:
-        """Read the result that gave a job its verdict. Raises `JobEnded` where it ended without one."""
+        """Return the result that gave a job its verdict. Raises `JobEnded` where it ended without one."""
         found = self.job(_id(job))
         if found.ended and found.result is None:
             raise JobEnded(found)
         return result_of_document(self._transport.get(_path("jobs", found.id, "result")))
 
     def result(self, result_id: str) -> Result:
-        """Read one result."""
+        """Return one result by its id. Raises `Refused` where there is none."""
         return result_of_document(self._transport.get(_path("results", result_id)))
 
     def results(self, **conditions: Any) -> Iterator[Result]:
@@ -175,14 +179,16 @@ class Client:
         key: str | None = None,
         unit: str | None = None,
     ) -> Result:
-        """Run a method on stored recordings or calibrations; one that needs neither is told the unit's serial."""
+        """Run a method on stored recordings or calibrations, wait, and return the result; a method that needs neither
+        takes the `unit`'s serial. Raises `Refused`.
+        """
         ids = [one.id if isinstance(one, Recording) else one for one in recordings]
         given = {"recordings": ids, "calibrations": list(calibrations), "parameters": dict(parameters or {})}
         given |= {} if unit is None else {"unit": unit}
         return result_of_document(self._transport.post("/api/v1/analyses", key, json={"method": method, **given}))
 
     def recording(self, recording_id: str) -> Recording:
-        """Find a recording; its samples are read when they are asked for."""
+        """Return a recording without its samples; they are read when they are asked for. Raises `Refused`."""
         return self._recording(self._transport.get(_path("recordings", recording_id)))
 
     def recordings(self, **conditions: Any) -> Iterator[Recording]:
@@ -192,7 +198,9 @@ class Client:
     def import_files(
         self, files: Sequence[str | Path], description: Mapping[str, Any], key: str | None = None
     ) -> Recording:
-        """Import files as one recording. `description` says what is in them: unit, rate, channels with their scale."""
+        """Import files as one recording and return it. `description` says what is in them: unit, rate, channels with
+        their scale. Raises `Refused` naming file and row.
+        """
         with ExitStack() as closing:
             opened = [(Path(file).name, closing.enter_context(Path(file).open("rb"))) for file in files]
             parts = [("files", (name, file, "application/octet-stream")) for name, file in opened]

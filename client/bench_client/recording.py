@@ -12,7 +12,7 @@ from bench_client.views import RecordingView
 
 
 class Recording:
-    """A recording; `view` has its channels, rate, count and where it came from."""
+    """A recording of the service; `view` has its description, and the methods read its samples."""
 
     def __init__(self, transport: Transport, view: RecordingView) -> None:
         self._transport = transport
@@ -25,7 +25,7 @@ class Recording:
     def raw(
         self, channels: Sequence[str] | None = None, start_s: float | None = None, stop_s: float | None = None
     ) -> NDArray[np.int32] | NDArray[np.float64]:
-        """Read the samples as the unit sent them, shape (n, channels). Raises `Refused`."""
+        """Return the samples as the unit sent them, shape (n, channels). Raises `Refused`."""
         names = None if channels is None else ",".join(channels)
         query = {"format": "npy", "channels": names, "start_s": start_s, "stop_s": stop_s}
         given = {name: value for name, value in query.items() if value is not None}

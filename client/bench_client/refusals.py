@@ -4,7 +4,7 @@ from bench_client.views import Job, Problem
 
 
 class BenchClientError(Exception):
-    """The client could not do what was asked."""
+    """Base of the client's exceptions: it could not do what was asked."""
 
 
 class Refused(BenchClientError):

@@ -41,7 +41,7 @@ class Samples:
 
 
 def raw_of(content: bytes) -> NDArray[np.int32] | NDArray[np.float64]:
-    """Read the file of an export in NumPy's format, shape (n, channels)."""
+    """Return the array in a file of an export in NumPy's format, shape (n, channels)."""
     return np.load(BytesIO(content), allow_pickle=False)
 
 

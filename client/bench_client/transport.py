@@ -1,4 +1,4 @@
-"""Requests over HTTP: token, patience with a service that is away, and refusals as exceptions.
+"""Requests over HTTP: token, retries while a service is away, and refusals as exceptions.
 
 What only reads is repeated, and what is sent with an idempotency key: such a create is made once however often it is
 asked for. Everything else is sent once.
@@ -25,7 +25,7 @@ KEY = "Idempotency-Key"
 
 
 class Transport:
-    """Sends requests to one service."""
+    """Sends requests to one service, with its token, and retries those that may be repeated."""
 
     def __init__(self, client: httpx.Client, patience_s: float, pause: Callable[[float], None] = time.sleep) -> None:
         """`patience_s`: time for which the service may be away [s]; `pause` waits for a number of seconds."""
@@ -34,11 +34,13 @@ class Transport:
         self._pause = pause
 
     def get(self, path: str, **query: Any) -> Any:
-        """Read a JSON document. Raises `Refused`, `Unavailable`."""
+        """Send a GET and return the JSON document of the answer. Raises `Refused`, `Unavailable`."""
         return self._json(self.send("GET", path, params=query))
 
     def post(self, path: str, key: str | None = None, once: bool = True, **options: Any) -> Any:
-        """Post, and read the answer. `once`: make it with an idempotency key, a new one where none is given."""
+        """Send a POST and return the JSON document of the answer. `once`: with an idempotency key, a new one where none
+        is given. Raises `Refused`, `Unavailable`.
+        """
         headers = {KEY: key or str(uuid4())} if once or key else {}
         return self._json(self.send("POST", path, headers=headers, **options))
 

@@ -160,6 +160,6 @@ class Page(BaseModel, Generic[T]):
 
 
 def sent(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy a query or a body without what is None; moments in ISO 8601."""
+    """Return a query or a body without its fields that are None, with moments in ISO 8601."""
     plain = {name: value.isoformat() if isinstance(value, datetime) else value for name, value in values.items()}
     return {name: value for name, value in plain.items() if value is not None}

@@ -1,1 +1,1 @@
-"""Analyses of recordings as pure functions, one subject per file. Shares no equation with the simulators."""
+"""Analyses of recordings as pure functions, one subject a folder or file. Shares no equation with the simulators."""

@@ -16,7 +16,7 @@ _FLICKER = 2.0 * log(2.0) / pi
 
 @dataclass(frozen=True)
 class AveragingTime:
-    """Time at which the quantization line falls below the rest of the noise."""
+    """Averaging time at which the quantization line falls below the rest of the noise, with its uncertainty."""
 
     tau_s: float | None
     """Crossing time; None where there is no other noise, 0 where there is no quantization."""

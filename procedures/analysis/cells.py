@@ -23,16 +23,15 @@ class Cells:
 
 
 def cell_samples(rate_hz: float, cell_s: float) -> int:
-    """Samples per cell: the whole number nearest to `cell_s`, at least one. Raises `BadParameter`."""
+    """Return the samples per cell: the whole number nearest to `cell_s`, at least one. Raises `BadParameter`."""
     if not 0.0 < cell_s < float("inf"):
         raise BadParameter("cell_s", cell_s, "finite and positive")
     return max(1, round(rate_hz * cell_s))
 
 
 def channel_rows(info: RecordingInfo, names: Sequence[str], blocks: Iterator[RawArray]) -> Iterator[Array]:
-    """The blocks of a recording as nominal rates, channel by channel, each (channels, n), in `rate_unit`.
-
-    Raises `MissingChannel`.
+    """Yield the blocks of a recording as nominal rates, channel by channel, each (channels, n), in `rate_unit`. Raises
+    `MissingChannel`.
     """
     columns, scale = [info.column(name) for name in names], info.nominal_scale(names)
     for block in blocks:
@@ -42,7 +41,7 @@ def channel_rows(info: RecordingInfo, names: Sequence[str], blocks: Iterator[Raw
 
 
 class CellStream:
-    """Gather cell means from rows of rates."""
+    """Running means over short cells, from rows of rates."""
 
     def __init__(self, info: RecordingInfo, names: Sequence[str], cell_s: float) -> None:
         """Start with no samples. Raises `BadParameter`, and `UnfitRecording` where there is not one whole cell."""
@@ -56,7 +55,7 @@ class CellStream:
         self._rest = np.empty((len(self._names), 0))
 
     def add(self, rows: Array) -> None:
-        """Add the next samples, (channels, n)."""
+        """Add the next samples, (channels, n); each full cell becomes a mean."""
         if self._rest.shape[1]:
             rows = np.concatenate([self._rest, rows], axis=1)
         cells = rows.shape[1] // self._samples
@@ -67,14 +66,16 @@ class CellStream:
         self._rest = rows[:, used:].copy()
 
     def finish(self) -> Cells:
-        """All cells, after the last sample. Raises `UnfitRecording`."""
+        """Return all cells. Call after the last sample. Raises `UnfitRecording` where samples are missing or not
+        numbers.
+        """
         info = self._info
         require_complete(info, self._filled * self._samples + self._rest.shape[1])
         return Cells(self._names, self._means, self._samples / info.rate_hz, info.since_launch_s)
 
 
 def cell_means(recording: Recording, names: Sequence[str], cell_s: float) -> Cells:
-    """Cell means of some channels of a recording.
+    """Return the cell means of some channels of a recording.
 
     Raises `MissingChannel`, `BadParameter`, and `UnfitRecording` where samples are not numbers, are not as many as
     announced or less than a cell.

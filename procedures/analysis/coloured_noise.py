@@ -49,7 +49,9 @@ class CosineSeries:
 
 
 def cosine_series(cells: Array, cell_s: float, most: int = MOST) -> CosineSeries:
-    """Group cell means (n,) [rate] of length `cell_s` [s]. Raises `BadParameter` and `UnfitRecording`."""
+    """Return cell means (n,) [rate] of length `cell_s` [s], grouped to at most `most`, with their cosine coefficients.
+    Raises `BadParameter` and `UnfitRecording`.
+    """
     if not 0.0 < cell_s < float("inf"):
         raise BadParameter("cell_s", cell_s, "finite and above 0 s")
     if cells.ndim != 1 or len(cells) < FEWEST:
@@ -67,18 +69,18 @@ def cosine_series(cells: Array, cell_s: float, most: int = MOST) -> CosineSeries
 
 
 def cosines(values: Array) -> Array:
-    """Orthonormal cosine coefficients k = 1…n−1 of columns (n,) or (n, m), in the unit of the values."""
+    """Return the orthonormal cosine coefficients k = 1…n−1 of columns (n,) or (n, m), in the unit of the values."""
     return np.asarray(dct(values, type=2, norm="ortho", axis=0), dtype=np.float64)[1:]
 
 
 def unit_variances(n: int, cell_s: float) -> Array:
-    """Variances of the cosine coefficients of n cells per unit Q², N², B² and K², (4, n−1)."""
+    """Return the variances of the cosine coefficients of n cells per unit Q², N², B² and K², (4, n−1)."""
     return cosine_powers(covariances(n, cell_s, WHOLE_BAND))
 
 
 @dataclass(frozen=True)
 class FittedNoise:
-    """Noise fitted by maximum likelihood."""
+    """Noise fitted by maximum likelihood, with the variances of the cosine coefficients under it, and the deviance."""
 
     noise: NoiseCoefficients
     variances: Array

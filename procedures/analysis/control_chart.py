@@ -28,7 +28,7 @@ ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 
 @dataclass(frozen=True)
 class RunRule:
-    """`count` of `window` points in a row beyond `sigmas` on one side of the centre."""
+    """Rule of a control chart: `count` of `window` points in a row beyond `sigmas` on one side of the centre."""
 
     name: str
     count: int
@@ -71,7 +71,9 @@ class Signal:
 
 
 def control_limits(values: Sequence[float]) -> ControlLimits:
-    """Centre and limits from values in the order of measurement, at least two, all finite. Raises `BadParameter`."""
+    """Return centre and limits from values in the order of measurement, at least two, all finite. Raises
+    `BadParameter`.
+    """
     x = _finite(values)
     if len(x) < LEAST_POINTS:
         raise BadParameter("values", len(x), f"a control chart needs at least {LEAST_POINTS}")

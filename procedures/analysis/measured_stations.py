@@ -60,5 +60,5 @@ def _near(measured: TableAngles, commanded: TableAngles) -> TableAngles:
 
 
 def angle_difference_deg(angle_deg: float, other_deg: float) -> float:
-    """Difference of two angles without whole turns, from −180 (included) to 180 [deg]."""
+    """Return the difference of two angles without whole turns, from −180 (included) to 180 [deg]."""
     return (angle_deg - other_deg + 180.0) % 360.0 - 180.0

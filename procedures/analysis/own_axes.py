@@ -24,7 +24,9 @@ OWN_AXES = " channels on their own axes"
 
 
 def axes_answered(matrix: Array) -> tuple[str, ...]:
-    """The axis of each row of answers (3, 3): "+x", "−y", "nothing" or "no single axis"."""
+    """Return the axis to which each channel answers, by the rows of answers (3, 3): "+x", "−y", "nothing" or "no single
+    axis".
+    """
     return tuple(_axis(row) for row in matrix)
 
 
@@ -37,7 +39,9 @@ def _axis(row: Array) -> str:
 
 
 def wrong_axes(triad: str, axes: Sequence[str]) -> str:
-    """Name exchanged, reversed and dead channels by the axes that they answer to; empty for a good triad."""
+    """Return a sentence naming exchanged, reversed and dead channels by the axes that they answer to; empty for a good
+    triad.
+    """
     names, own = TRIADS[triad], [f"+{axis}" for axis in AXES]
     told: list[str] = []
     for i, (name, axis) in enumerate(zip(names, axes, strict=True)):
@@ -54,7 +58,8 @@ def wrong_axes(triad: str, axes: Sequence[str]) -> str:
 
 
 def own_axis_check(triad: str, matrix: Array) -> Check:
-    """Least cosine between a channel's sensitive axis, a row of K (3, 3), and the axis of its name.
+    """Return the check of the least cosine between a channel's sensitive axis, a row of K (3, 3), and the axis of its
+    name.
 
     A linear fit makes a good calibration of exchanged channels too, and its residuals do not show them.
     """

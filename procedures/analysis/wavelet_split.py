@@ -36,7 +36,7 @@ _NORMAL_MAD = 0.6745
 
 @dataclass(frozen=True)
 class Level:
-    """Thresholding of one level, of which 1 is the finest."""
+    """Thresholding of one level of a wavelet split, of which 1 is the finest."""
 
     number: int
     from_s: float
@@ -102,12 +102,14 @@ def wavelet_split(
 
 
 def most_levels(cells: int, wavelet: str = "sym8") -> int:
-    """Greatest number of levels into which a series of `cells` cells can be split; 0: it is too short for any."""
+    """Return the greatest number of levels into which a series of `cells` cells can be split; 0: it is too short for
+    any.
+    """
     return int(pywt.dwt_max_level(cells, _filter_length(wavelet)))
 
 
 def heursure(details: Array) -> float:
-    """The dimensionless threshold of details (n,) of unit noise."""
+    """Return the dimensionless threshold of details (n,) of unit noise."""
     n = len(details)
     if n < 2:
         return 0.0

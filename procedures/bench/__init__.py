@@ -55,7 +55,8 @@ class Bench:
     """Time within which each real device must be safe [s]; empty: devices are made safe one after the other."""
 
     async def make_safe(self) -> None:
-        """Stop the table, lead the chamber to ambient, take the current away, switch the unit off.
+        """Stop the table, command the chamber to ambient, take the current away, switch the unit off, and wait until
+        each reads back so.
 
         Every device is tried; raises an `ExceptionGroup` of what failed.
         """
@@ -70,7 +71,9 @@ class Bench:
             raise ExceptionGroup("the bench could not be made safe", failures)
 
     def checkpoint(self) -> dict[str, Any] | None:
-        """State from which a simulated bench can resume after a restart; None for a real bench, which never stops."""
+        """Return the state from which a simulated bench can resume after a restart, as JSON; None for a real bench,
+        which never stops.
+        """
         return None
 
     def close(self) -> None:

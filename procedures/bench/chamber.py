@@ -1,4 +1,4 @@
-"""Port of the thermal chamber."""
+"""Interface of the thermal chamber."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -36,7 +36,9 @@ class ChamberAccuracy:
 
 @dataclass(frozen=True)
 class ChamberReading:
-    """Readings of the chamber at one moment. They are not the regressor: the unit's own sensors are."""
+    """Readings of the chamber at one moment: air, set point, state. Thermal corrections do not use them: they use the
+    unit's own sensors.
+    """
 
     time_s: float
     """Bench time of the reading [s]; its age is the clock's time less this."""
@@ -75,11 +77,11 @@ class Chamber(Device, Protocol):
         ...
 
     async def read(self) -> ChamberReading:
-        """Read the chamber's present state. Raises `Disconnected`."""
+        """Return the chamber's present air temperature, set point and status words. Raises `Disconnected`."""
         ...
 
     async def make_safe(self) -> None:
-        """Lead a running chamber to ambient at its fastest ramp; returns once the final set point reads back.
+        """Command a running chamber to ambient at its fastest ramp; returns once the final set point reads back.
 
         One that is off is not started: it stays off, also where the limiter has tripped or the door is open. Raises
         `Disconnected`, `DeviceFault`.

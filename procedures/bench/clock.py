@@ -4,10 +4,10 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Clock of the bench. On a simulated bench sleeping moves the world, on a real one it waits."""
+    """Clock of the bench. A sleep computes a simulated bench onwards, and waits on a real one."""
 
     def now_s(self) -> float:
-        """Seconds since the bench was opened for the job's first launch."""
+        """Return the seconds since the bench was opened for the job's first launch."""
         ...
 
     async def sleep(self, seconds: float) -> None: ...

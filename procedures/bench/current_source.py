@@ -1,4 +1,6 @@
-"""The precision current source of the converter's own bench: one current through the inputs of all three channels."""
+"""Interface of the precision current source of the converter's own bench: one current through the inputs of all three
+channels.
+"""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -42,7 +44,7 @@ class CurrentSource(Device, Protocol):
         ...
 
     async def read(self) -> CurrentSourceReading:
-        """Read the present setting. Raises `Disconnected`."""
+        """Return the present setting and status words. Raises `Disconnected`."""
         ...
 
     async def make_safe(self) -> None:

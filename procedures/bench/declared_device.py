@@ -15,7 +15,7 @@ class DeclaredCertificate:
     """Day after which it has expired, ISO 8601 ("2027-03-02")."""
 
     def overdue(self, today: str) -> bool:
-        """True if it has expired on a day, ISO 8601."""
+        """Return whether the certificate has expired on a day, ISO 8601."""
         return today > self.due
 
 

@@ -49,7 +49,9 @@ class TableAccuracy:
 
 @dataclass(frozen=True)
 class BenchDescription:
-    """A bench as its laboratory declares it."""
+    """A bench as its laboratory declares it: site, limits of its devices, accuracy of its table, and its devices with
+    certificates.
+    """
 
     id: str
     site: Site
@@ -87,7 +89,7 @@ class BenchDescription:
         return "mixed" if len(kinds) > 1 else "simulated" if kinds == {True} else "real"
 
     def overdue(self, today: str) -> tuple[str, ...]:
-        """Certificates that have expired on a day (ISO 8601), a sentence each."""
+        """Return a sentence for each certificate that has expired on a day (ISO 8601)."""
         return tuple(
             f"the certificate {c.number} of the {d.name} expired after {c.due}"
             for d in self.devices
@@ -100,13 +102,15 @@ class BenchDescription:
         return tuple((axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (self.outer, self.middle, self.inner))
 
     def axis(self, name: AxisName) -> AxisLimits:
-        """Limits of an axis by name."""
+        """Return the limits of an axis by its name."""
         return {"outer": self.outer, "middle": self.middle, "inner": self.inner}[name]
 
     def violations(
         self, angles: TableAngles, turn: Turn | None = None, profile: TemperatureProfile | None = None
     ) -> tuple[str, ...]:
-        """Violations of the limits by angles, by whole turns that begin at them, or by a profile; a sentence each."""
+        """Return violations of the limits by angles, by whole turns that begin at them, or by a profile; a sentence
+        each.
+        """
         demands = (
             ("outer", self.outer, angles.outer_deg),
             ("middle", self.middle, angles.middle_deg),
@@ -122,7 +126,9 @@ class BenchDescription:
         return beyond if profile is None else beyond + self._profile_violations(profile)
 
     def motion_violations(self, station: Station) -> tuple[str, ...]:
-        """Violations of the limits by what a station demands of table and chamber; none where it names no angles."""
+        """Return violations of the limits by what a station demands of table and chamber, a sentence each; none where
+        it names no angles.
+        """
         if station.angles is None:
             return ()
         if station.sinusoid is not None:
@@ -130,7 +136,9 @@ class BenchDescription:
         return self.violations(station.angles, station.turn, station.profile)
 
     def current_violations(self, current_ma: float, profile: TemperatureProfile | None) -> tuple[str, ...]:
-        """Violations by a converter alone: of a current on its inputs, and of a profile that it soaks by."""
+        """Return violations by a converter alone, of a current on its inputs and of a profile that it soaks by, a
+        sentence each.
+        """
         found: tuple[str, ...] = () if profile is None else self._profile_violations(profile)
         if self.current_source is None:
             return (*found, f"bench {self.id} has no precision current source")
@@ -138,7 +146,7 @@ class BenchDescription:
         return found if abs(current_ma) <= most else (*found, f"{current_ma:g} mA is outside {-most:g} … {most:g} mA")
 
     def sinusoid_violations(self, angles: TableAngles, sinusoid: Sinusoid) -> tuple[str, ...]:
-        """Violations of the limits by a sinusoid about angles, a sentence each."""
+        """Return violations of the limits by a sinusoid about angles, a sentence each."""
         if not self.sinusoidal:
             return (f"the table of bench {self.id} does not follow sinusoids",)
         limits, axis = self.axis(sinusoid.axis), sinusoid.axis
@@ -157,7 +165,7 @@ class BenchDescription:
         return tuple(found)
 
     def rate_violations(self, angles: TableAngles, rate: ConstantRate) -> tuple[str, ...]:
-        """Violations of the limits by a constant rate that begins at angles, a sentence each."""
+        """Return violations of the limits by a constant rate that begins at angles, a sentence each."""
         limits, axis = self.axis(rate.axis), rate.axis
         begin = {"outer": angles.outer_deg, "middle": angles.middle_deg, "inner": angles.inner_deg}[axis]
         end = begin + rate.angle_deg

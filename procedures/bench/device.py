@@ -1,4 +1,4 @@
-"""Identity and status of a device: the part of a port that every device has in common."""
+"""Identity and status of a device: the part of the interface that every device has in common."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -39,7 +39,9 @@ Status = tuple[StatusWord, ...]
 
 
 class Device(Protocol):
-    """Device of a bench."""
+    """A device of a bench that can be asked for its identity. Base of the interfaces of table, chamber, supply, unit
+    and source.
+    """
 
     async def identify(self) -> DeviceIdentity:
         """Ask the device for its maker, model, serial and firmware. Raises `Disconnected`."""

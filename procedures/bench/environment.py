@@ -1,4 +1,4 @@
-"""Port of the room's conditions: a sensor, or what a person entered."""
+"""Interface of the room's conditions: a sensor, or what a person entered."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -22,5 +22,7 @@ class Environment(Device, Protocol):
     """Conditions of the room around the bench."""
 
     async def read(self) -> EnvironmentReading:
-        """Read the room's conditions. Raises `Disconnected`."""
+        """Return the room's temperature, humidity and pressure; None for what is not measured. Raises
+        `Disconnected`.
+        """
         ...

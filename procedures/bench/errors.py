@@ -18,36 +18,38 @@ class BenchError(Exception):
 
 
 class OutOfRange(BenchError):
-    """A demand beyond a limit: refused before anything moves."""
+    """Raised for a demand beyond a limit, before anything moves; demands are never clamped."""
 
 
 class NotSettled(BenchError):
-    """The table did not come to rest in time."""
+    """Raised where the table did not come to rest in time."""
 
 
 class SoakNotReached(BenchError):
-    """The chamber or the unit's temperatures did not come to rest in the time that a leg of a profile allows."""
+    """Raised where the chamber or the unit's temperatures did not come to rest in the time that a leg of a profile
+    allows.
+    """
 
 
 class NotPowered(BenchError):
-    """A reading was asked of a unit that is switched off."""
+    """Raised where a reading was asked of a unit that is switched off."""
 
 
 class DeviceFault(BenchError):
-    """A device reports a fault."""
+    """Raised where a device reports a fault, refuses a demand, or reads back otherwise than commanded."""
 
 
 class Disconnected(BenchError):
-    """A device does not answer."""
+    """Raised where a device does not answer within its time-out, or its link is lost."""
 
 
 class DeviceBusy(BenchError):
-    """Another process has the device's link, which admits one master."""
+    """Raised where another process has the device's link, which admits one master."""
 
 
 class OtherVersion(BenchError):
-    """The bench cannot continue from a state that another version of it stored."""
+    """Raised where the bench cannot continue from a state that another version of it stored."""
 
 
 class Stopped(BenchError):
-    """An operator's stop or cancel ended the work."""
+    """Raised where an operator's stop or cancel ended the work."""

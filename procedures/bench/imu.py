@@ -1,4 +1,4 @@
-"""Port of the unit's data link."""
+"""Interface of the unit's data link."""
 
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
@@ -46,5 +46,7 @@ class Imu(Device, Protocol):
         ...
 
     def status(self) -> Status:
-        """Status words of the newest frame, without waiting; empty before the first one, or where there are none."""
+        """Return the status words of the newest frame, without waiting; empty before the first one, or where there are
+        none.
+        """
         ...

@@ -9,7 +9,7 @@ from procedures.core.recording import Station
 
 @dataclass(frozen=True)
 class BenchNeeds:
-    """Required sample rate, and the optional sensors and sources that a job uses."""
+    """Needs of a job on its bench: a sample rate, and the optional sensors and sources that it uses."""
 
     sample_rate_hz: float | None = None
     """Sample rate of the unit; None: its own rate."""
@@ -23,7 +23,7 @@ class BenchNeeds:
 
     @classmethod
     def of(cls, stations: Sequence[Station]) -> "BenchNeeds":
-        """Requirements of all stations of a job together. Raises `BadParameter` where they disagree."""
+        """Return the needs of all stations of a job together. Raises `BadParameter` where they disagree."""
         rates = {station.sample_rate_hz for station in stations}
         if len(rates) > 1:
             raise BadParameter("stations", sorted(map(str, rates)), "one sample_rate_hz for all stations of a job")

@@ -1,4 +1,4 @@
-"""The person at the bench, for work that no device can do."""
+"""Interface of the person at the bench, for work that no device can do."""
 
 from typing import Protocol
 

@@ -1,4 +1,4 @@
-"""Port of the unit's power supply."""
+"""Interface of the unit's power supply."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -20,7 +20,7 @@ class SupplyLimits:
     """Current limit at which the output is switched on."""
 
     def violations(self, voltage_v: float, current_a: float | None = None) -> tuple[str, ...]:
-        """Violations of the limits by a demand, a sentence each."""
+        """Return violations of the limits by a demanded voltage and current, a sentence each."""
         found: list[str] = []
         if not self.minimum_v <= voltage_v <= self.maximum_v:
             found.append(f"voltage_v = {voltage_v:g} is outside {self.minimum_v:g} … {self.maximum_v:g}")
@@ -79,11 +79,13 @@ class Supply(Device, Protocol):
         ...
 
     async def switch_off(self) -> None:
-        """Switch the output off. Raises `Disconnected`."""
+        """Switch the output off; returns once it reads back as off. Raises `Disconnected`."""
         ...
 
     async def read(self) -> SupplyReading:
-        """Measure the output and read its state. Raises `Disconnected`."""
+        """Return measured voltage and current, the settings, and whether the output is on, limiting or tripped. Raises
+        `Disconnected`.
+        """
         ...
 
     async def make_safe(self) -> None:

@@ -1,4 +1,4 @@
-"""Port of the three-axis turntable."""
+"""Interface of the three-axis turntable."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -53,12 +53,16 @@ MOST_TRACED = 100_000
 
 
 class Turntable(Device, Protocol):
-    """Port of the turntable. `move_to` and `settle` return when all axes are at rest and locked, the other verbs as
-    soon as the table has answered. No verb holds the bench's loop: each awaits the table's answer, with a deadline.
+    """Three-axis turntable. `move_to` and `settle` return when all axes are at rest and locked, the other verbs as soon
+    as the table has answered.
+
+    No verb holds the bench's loop: each awaits the table's answer, with a deadline.
     """
 
     async def move_to(self, angles: TableAngles) -> None:
-        """Move all axes, settle, lock. Raises `OutOfRange` before anything moves, `NotSettled`, `DeviceFault`."""
+        """Move all axes, and return when they have settled and are locked. Raises `OutOfRange` before anything moves,
+        `NotSettled`, `DeviceFault`.
+        """
         ...
 
     async def command_turn(self, turn: Turn) -> None:
@@ -99,7 +103,7 @@ class Turntable(Device, Protocol):
         ...
 
     async def read(self) -> TableReading:
-        """Read encoders and status words; at any time, during a motion too. Raises `Disconnected`."""
+        """Return encoder angles, rates and status words; at any time, during a motion too. Raises `Disconnected`."""
         ...
 
     async def make_safe(self) -> None:
@@ -112,7 +116,7 @@ class Turntable(Device, Protocol):
 
 
 def appended(kept: EncoderTrace, fresh: EncoderTrace) -> EncoderTrace:
-    """Readings after earlier ones, the newest `MOST_TRACED` of them."""
+    """Return readings after earlier ones, the newest `MOST_TRACED` of them."""
     return EncoderTrace(
         np.concatenate([kept.time_s, fresh.time_s])[-MOST_TRACED:],
         np.concatenate([kept.angles_deg, fresh.angles_deg])[-MOST_TRACED:],

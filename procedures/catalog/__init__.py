@@ -7,10 +7,12 @@ from procedures.procedure import Procedure
 
 
 def find(only: str | None = None) -> Discovered[Procedure[Any, Any]]:
-    """Every PROCEDURE of this folder by name, or one alone, and the files that give none, with the reason."""
+    """Return every PROCEDURE of this folder by name, or the one named `only`, and the files that give none, with the
+    reason.
+    """
     return discovered(__name__, __path__, "PROCEDURE", Procedure, only)
 
 
 def discover() -> dict[str, Procedure[Any, Any]]:
-    """All procedures of this folder by name, which is the file's. Raises the error of the first broken file."""
+    """Return all procedures of this folder by name, which is the file's. Raises the error of the first broken file."""
     return find().complete()

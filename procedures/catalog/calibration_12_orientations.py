@@ -14,7 +14,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.estimator import Weighting
-from procedures.analysis.calibration.plan import TriadPlan, basis, triad_plan
+from procedures.analysis.calibration.plan import TriadPlan, basis, in_sample_covariance, triad_plan
 from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.analysis.calibration.reference_temperature import ThermalShare, least_dwell_s, require_correctable
 from procedures.analysis.calibration.scalar import require_scalar_determined
@@ -115,7 +115,9 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Dwell from the unit; site and table accuracy from the bench. Refuses a correction that the unit does not have."""
+    """Return the parameters with the dwell from the unit, and site and table accuracy from the bench. Raises
+    `BadParameter` for a correction that the unit does not have.
+    """
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
     full.require_sources(context, full.thermal_correction == "current")
@@ -123,7 +125,9 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Stations of the calibration, one an orientation, in the order given."""
+    """Return the stations of the calibration, one an orientation, in the order given. Raises `BadParameter` where the
+    dwell is not resolved.
+    """
     turn = orientation_beta_gamma if params.rotation_order == "x_after_z" else orientation_gamma_beta
     if params.dwell_s is None:
         raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
@@ -143,7 +147,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration, the uncertainty of every coefficient, and the limits out of reach. Raises `Undetermined`."""
+    """Return duration, the uncertainty of every coefficient, and the limits out of reach. Raises `Undetermined`."""
     params = resolve(params, context)
     stations = schedule(params)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
@@ -157,13 +161,15 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Move, settle, record, station after station."""
+    """Move, settle, record, station after station; yield the stream of each."""
     for station in stations:
         yield await steps.record_station(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Least squares over the station means of both triads."""
+    """Return the coefficients of both triads by least squares over the station means, with checks. Raises
+    `UnfitRecording`, `Undetermined`.
+    """
     params = resolve(params, context)
     site = params.site(context)
     uncertainty = params.table(site)
@@ -192,29 +198,32 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """Calibrations that the result gives, one a triad."""
+    """Return the calibrations that the result gives, one a triad."""
     return tuple(t.calibration for t in result.triads)
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Checks and coefficients that a result will have."""
+    """Return the names of the checks and coefficients that a result will have."""
     checks = (" bias in run, δ/√3", " condition number", OWN_AXES, " residuals, p-value of chi-square")
     return tuple(f"{triad}{n}" for triad in TRIAD_NAMES for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
-    """Checks of the error per axis δ/√3, in sample."""
+    """Return the planned checks of the error per axis δ/√3, in sample."""
     params = resolve(params, context)
     limits = params.limits
     maxima = {"gyro": limits.gyro_bias_in_run_deg_h, "accelerometer": limits.accelerometer_bias_in_run_m_s2}
     level = limits.residual_p_value_min
     name, limit = "residuals, p-value of chi-square", Limit("1", minimum=level, source="ours: a test of significance")
-    found = [in_run_check(_plan(triad, params, context), maxima[triad]) for triad in TRIAD_NAMES]
+    plans = {triad: _plan(triad, params, context) for triad in TRIAD_NAMES}
+    found = [in_run_check(plan, maxima[triad], in_sample_covariance(plan)) for triad, plan in plans.items()]
     return (*found, *(PlannedCheck(f"{triad} {name}", limit, level=level) for triad in TRIAD_NAMES))
 
 
 def report(result: Result) -> Report:
-    """Coefficients, scalar cross-checks, budgets, residuals and magnitudes (thesis Tables 5.1-5.4, fig. 5.6-5.12)."""
+    """Return the report: coefficients, scalar cross-checks, budgets, residuals and magnitudes (thesis Tables 5.1-5.4,
+    fig. 5.6-5.12).
+    """
     magnitudes = [t.magnitudes for t in result.triads]
     tables = [pictures.triad_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
@@ -258,8 +267,10 @@ def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
     found = [unresolved(by_triad[r.triad], r) for r in wanted]
     deg_h = units.DEG_PER_HOUR
     found += [
-        in_run_unresolved(by_triad["gyro"], limits.gyro_bias_in_run_deg_h * deg_h, "deg/h", deg_h),
-        in_run_unresolved(by_triad["accelerometer"], limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0),
+        in_run_unresolved(by_triad["gyro"], limits.gyro_bias_in_run_deg_h * deg_h, "deg/h", deg_h, in_sample=True),
+        in_run_unresolved(
+            by_triad["accelerometer"], limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0, in_sample=True
+        ),
     ]
     unknown = [
         f"the noise of the {p.triad} triad is not known: its uncertainties come from the scatter within the dwells and "

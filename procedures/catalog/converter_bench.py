@@ -84,7 +84,7 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """The source's accuracy from the bench's declaration."""
+    """Return the parameters with the current source's accuracy as the bench declares it."""
     source = context.bench.current_source
     if source is None:
         return params
@@ -92,7 +92,9 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Two stations a soak: plus and minus the current."""
+    """Return two stations a soak: plus and minus the current. Raises `BadParameter` for a temperature that is named
+    twice.
+    """
     if len(set(params.temperatures_c)) < len(params.temperatures_c):
         raise BadParameter("temperatures_c", params.temperatures_c, "each temperature once")
     stations: list[Station] = []
@@ -123,7 +125,7 @@ some ten minutes each. Only for previews."""
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Predict the duration, roughly; the uncertainty of the functions depends on noise that is not declared."""
+    """Return a rough duration; the uncertainty of the functions depends on noise that is not declared."""
     params = resolve(params, context)
     reach = np.abs(
         np.diff([context.bench.chamber.ambient_c if context.bench.chamber else 20.0, *params.temperatures_c])
@@ -137,13 +139,13 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Current, soak, record, station after station."""
+    """Set the current, soak, record, station after station; yield the stream of each."""
     for station in stations:
         yield await chamber_steps.record_current(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Zero and scale at each soak, and their normalised functions."""
+    """Return zero and scale at each soak, and their normalised functions over temperature. Raises `UnfitRecording`."""
     params = resolve(params, context)
     soaks = read_soaks(recordings, params.current_ma)
     gain, zero = params.gain_sd_ppm or 0.0, params.zero_sd_ma or 0.0
@@ -155,7 +157,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def corrections(result: Result) -> tuple[UnitCorrection, ...]:
-    """Correction of the first stage that the result gives."""
+    """Return the correction of the first stage that the result gives."""
     x, y, z = (channel.model for channel in result.channels)
     triad: ConverterTriad = (x, y, z)
     return (UnitCorrection("converter", triad),)
@@ -210,7 +212,7 @@ def _checks(channel: ChannelResult, limits: Limits) -> list[Check]:
 
 
 def report(result: Result) -> Report:
-    """Report of coefficients, soaks, and the normalised functions with the data that they were fitted to."""
+    """Return the report: coefficients, soaks, and the normalised functions with the data that they were fitted to."""
     rows: list[tuple[str | float | None, ...]] = []
     for channel in result.channels:
         for title, part in (("Fc, K0 in codes/mA", channel.model.scale), ("Fs, N0 in codes", channel.model.zero)):

@@ -109,7 +109,9 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Amplitudes from the limits of the outer axis; the interval of a reading from its rate."""
+    """Return the parameters with amplitudes from the limits of the outer axis, and the interval of a reading from its
+    rate.
+    """
     outer = context.bench.outer
     amplitudes = tuple(
         float(f"{largest_amplitude_deg(f, outer.rate_deg_s, outer.acceleration_deg_s2):.4g}")
@@ -121,12 +123,12 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Axis after axis, frequency after frequency, one station each. Raises `BadParameter`."""
+    """Return the stations, axis after axis, frequency after frequency, one each. Raises `BadParameter`."""
     return _program(params).stations()
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Predict the duration, and the uncertainty of each channel's delay and gain for a unit without a lag.
+    """Return the duration, and the uncertainty of each channel's delay and gain for a unit without a lag.
 
     Raises `BadParameter` where the table cannot swing so, or the unit's samples cannot show it.
     """
@@ -164,13 +166,13 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Move, settle, swing, record unit and encoder, station after station."""
+    """Move, settle, swing, record unit and encoder, station after station; yield the stream of each."""
     for station in stations:
         yield await sinusoids.record_sinusoid(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Delay and lag of each channel. Raises `UnfitRecording`, `MissingChannel`."""
+    """Return delay and bandwidth of each gyro channel, with checks. Raises `UnfitRecording`, `MissingChannel`."""
     record = context.unit.gyro
     noise = {} if record is None else dict(zip(GYRO, record.noise, strict=True))
     found = analyse_response(recordings, noise, params.linearity_ppm * units.PPM, params.encoder_time_sd_s)
@@ -180,12 +182,12 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def report(result: Result) -> Report:
-    """Delays, gain and phase over the frequencies."""
+    """Return the report: delays, gain and phase over the frequencies."""
     return response_report(result.gyro)
 
 
 def inspection(_params: Params) -> Inspection:
-    """Inspection of recordings that swing: the gyros' channels alone matter."""
+    """Return the settings of the inspection for recordings that swing: only the gyros' channels are inspected."""
     return Inspection(FitnessSettings(at_rest=False, counters_may_rest=True), channels=GYRO)
 
 
@@ -222,7 +224,7 @@ def _limit(unit: str, maximum: float | None = None, minimum: float | None = None
 
 
 def quantities(params: Params, _context: Context) -> tuple[str, ...]:
-    """Names of the checks that a result will have."""
+    """Return the names of the checks that a result will have."""
     limits = params.limits
     wanted = [DELAY] * (limits.delay_ms is not None) + [BANDWIDTH] * (limits.bandwidth_hz is not None) + [RESIDUALS]
     named = tuple(name.format(axis) for axis in params.axes for name in wanted)
@@ -230,7 +232,7 @@ def quantities(params: Params, _context: Context) -> tuple[str, ...]:
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
-    """Checks on the delays, with the plan's uncertainties, and on residuals."""
+    """Return the planned checks on the delays, with the plan's uncertainties, and on residuals."""
     limits, made = params.limits, list[PlannedCheck]()
     sd = {u.quantity: u.standard_uncertainty for u in predict(params, context).uncertainties}
     level = limits.residual_p_value_min

@@ -15,7 +15,13 @@ from procedures.analysis.calibration.plan import triad_plan
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.own_axes import OWN_AXES
-from procedures.analysis.turns.ferraris import END_REST_S, face_stations, ferraris_estimator, rests_and_turns
+from procedures.analysis.turns.ferraris import (
+    END_REST_S,
+    face_stations,
+    ferraris_estimator,
+    ferraris_flaws,
+    rests_and_turns,
+)
 from procedures.analysis.turns.plan import coefficient_names
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -47,7 +53,7 @@ class Params(TableParameters):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Rest from the unit; ramps, site and table accuracy from the bench."""
+    """Return the parameters with the rest from the unit, and ramps, site and table accuracy from the bench."""
     ramp_s = default_ramp_s(params.rate_deg_s, context.bench)
     end_rest_s = rest_with_demands(END_REST_S, context.bench)
     own = {"rest_s": context.unit.averaging_time_s, "ramp_s": ramp_s, "end_rest_s": end_rest_s}
@@ -57,7 +63,9 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Face after face: a rest, turns there, turns back. Raises `BadParameter` where a rate would not be reached."""
+    """Return the stations, face after face: a rest, turns there, turns back. Raises `BadParameter` where a rate would
+    not be reached.
+    """
     if params.rest_s is None or params.ramp_s is None or params.end_rest_s is None:
         raise BadParameter("rest_s", None, "resolve the parameters first: rests and ramp come from unit and bench")
     turns = (params.turns, params.rate_deg_s, params.ramp_s, params.settle_s, params.end_rest_s)
@@ -68,7 +76,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration and the uncertainty of each coefficient of both triads. Raises `BadParameter`, `Undetermined`."""
+    """Return duration and the uncertainty of each coefficient of both triads. Raises `BadParameter`, `Undetermined`."""
     params = resolve(params, context)
     stations = schedule(params)
     require_rest("end_rest_s", params.end_rest_s, context.bench)
@@ -93,7 +101,8 @@ def _gyro(params: Params, context: Context, stations: Sequence[Station]) -> list
         return []
     site, known = params.site(context), context.unit.known_matrix("gyro")
     motion = rests_and_turns(stations, spans[:, 1] - spans[:, 0], site)
-    made = ferraris_estimator(motion, noise, params.table(site), np.eye(3) if known is None else known)
+    flaws = ferraris_flaws(motion, params.table(site))
+    made = ferraris_estimator(motion, noise, flaws, np.eye(3) if known is None else known)
     total, own = made.covariance.diagonal() ** 0.5, made.noise_covariance.diagonal() ** 0.5
     table = (made.table_per_sd**2).sum(axis=1) ** 0.5
     parts = zip(coefficient_names(()), total.tolist(), own.tolist(), table.tolist(), strict=True)
@@ -104,20 +113,22 @@ def _gyro(params: Params, context: Context, stations: Sequence[Station]) -> list
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Move, settle, record at rest or while the table turns, station after station."""
+    """Move, settle, record at rest or while the table turns, station after station; yield the stream of each."""
     for station in stations:
         yield await steps.record_turn(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Least squares over rests and turns of both triads."""
+    """Return the coefficients of both triads by least squares over rests and turns. Raises `UnfitRecording`,
+    `MissingChannel`, `Undetermined`.
+    """
     params = resolve(params, context)
     site = params.site(context)
     return ferraris.calibrated(recordings, site, params.table(site), context.unit, params.limits)
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Checks and coefficients that a result will have."""
+    """Return the names of the checks and coefficients that a result will have."""
     scale = tuple(f"gyro scale factor {axis}, 3σ" for axis in AXES)
     residuals = tuple(f"{triad} {ferraris.RESIDUALS}" for triad in ("gyro", "accelerometer"))
     named = tuple(f"{triad}.{name}" for triad in ("gyro", "accelerometer") for name in COEFFICIENT_NAMES)
@@ -125,7 +136,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
-    """Checks of the scale factors' uncertainty, by the plan, and the tests of the residuals."""
+    """Return the planned checks of the scale factors' uncertainty, by the plan, and of the residuals."""
     params = resolve(params, context)
     sd = {u.name: u.standard_uncertainty / units.PPM for u in _gyro(params, context, schedule(params))}
     limit = Limit("ppm", maximum=params.limits.gyro_scale_3_sigma_ppm, source="ours")

@@ -86,12 +86,14 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Site and table accuracy from the bench."""
+    """Return the parameters with site and table accuracy from the bench."""
     return params.filled(declared_table(context))
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Round after round through the orientations, one station an alignment."""
+    """Return the stations, round after round through the orientations, one an alignment. Raises `BadParameter` for too
+    many.
+    """
     wanted = params.repetitions * len(params.orientations)
     if wanted > MOST_ALIGNMENTS:
         raise BadParameter("repetitions", params.repetitions, f"{wanted} alignments, {MOST_ALIGNMENTS} are the most")
@@ -111,7 +113,9 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration and the errors to expect. Refuses a pole, an attitude on end, and a unit without a calibration."""
+    """Return duration and the errors to expect. Raises `BadParameter` at a pole or for an attitude on end,
+    `NoCalibration`.
+    """
     params = resolve(params, context)
     site, stations, axes = params.site(context), schedule(params), context.bench.axis_motion
     require_alignable(site.latitude_deg)
@@ -129,13 +133,15 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Off, on, turn to the orientation, record; alignment after alignment."""
+    """Switch off and on, turn to the orientation, record, alignment after alignment; yield the stream of each."""
     for station in stations:
         yield await steps.record_station(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Align from each recording's corrected means; judge all errors together. Raises as `predict`, `UnfitRecording`."""
+    """Return the alignment from each recording's corrected means, and all errors judged together. Raises as `predict`,
+    `UnfitRecording`.
+    """
     params = resolve(params, context)
     site = params.site(context)
     plan = recorded_alignments(recordings, context.unit, site, params.table(site))
@@ -156,7 +162,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def report(result: Result) -> Report:
-    """Report of found and predicted errors, the source of the prediction, and every alignment."""
+    """Return the report of found and predicted errors, the source of the prediction, and every alignment."""
     sections = (
         pictures.errors_table(result.angles),
         pictures.sources_table(result.angles),

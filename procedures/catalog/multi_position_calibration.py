@@ -49,7 +49,9 @@ class Params(FitParameters, TableParameters, DwellParameters):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Positions of the thesis's program where none are given; dwell from the unit; site and table from the bench."""
+    """Return the parameters with the thesis's positions where none are given, the dwell from the unit, site and table
+    from the bench. Raises `BadParameter`.
+    """
     if params.program is not None and params.positions is not None:
         raise BadParameter("positions", len(params.positions), "not together with a program: give one of the two")
     own = {"positions": FOURTEEN} if params.program is None else {}
@@ -60,7 +62,9 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Stations, one a position, in order. Raises `BadParameter` for a line outside the program's language."""
+    """Return the stations, one a position, in order. Raises `BadParameter` for a line outside the program's
+    language.
+    """
     if params.program is not None:
         rests = [(d.angles, params.dwell_s or d.delay_s) for d in read_program(params.program)]
     elif params.positions is None or params.dwell_s is None:
@@ -82,7 +86,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration and the uncertainty of every coefficient. Raises `Undetermined` saying which position to add."""
+    """Return duration and the uncertainty of every coefficient. Raises `Undetermined` saying which position to add."""
     params = resolve(params, context)
     stations = schedule(params)
     for triad, inputs in _inputs(params, context).items():
@@ -96,13 +100,15 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Move, settle, record, position after position."""
+    """Move, settle, record, position after position; yield the stream of each."""
     for station in stations:
         yield await steps.record_station(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Least squares over the means of the positions. Raises `UnfitRecording`, `Undetermined`."""
+    """Return the calibration by least squares over the means of the positions. Raises `UnfitRecording`,
+    `Undetermined`.
+    """
     params = resolve(params, context)
     return multi_position.calibrated(recordings, params, _inputs(params, context), context.unit)
 

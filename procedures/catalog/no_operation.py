@@ -1,4 +1,4 @@
-"""No operation: no station, nothing moves, always passes. Measures the service itself."""
+"""Procedure without stations: nothing moves, it always passes. For measuring the service itself."""
 
 from collections.abc import AsyncIterator, Sequence
 
@@ -11,7 +11,7 @@ from procedures.procedure import Context, Outcome, Parameters, Prediction, Proce
 
 
 class Params(Parameters):
-    """No parameters to be chosen."""
+    """Parameters of the procedure, of which there are none to be chosen."""
 
 
 class Result(Outcome):
@@ -31,13 +31,13 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Record nothing, for any stations."""
+    """Record nothing: an empty stream of recordings, for any stations."""
     for _ in ():
         yield _
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """A pass by definition: the one procedure that judges nothing and still passes."""
+    """Return a pass without any check: the one procedure that judges nothing and still passes."""
     return Result(verdict=Verdict.PASS)
 
 
@@ -46,7 +46,7 @@ def report(result: Result) -> Report:
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """No quantities of a result: nothing is measured."""
+    """Return no names: the result has no quantities."""
     return ()
 
 

@@ -58,14 +58,18 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Ramp from the outer axis' acceleration, rest from the table's demands: the last half of it is at rest."""
+    """Return the parameters with the ramp from the outer axis' acceleration, and the rest from the table's demands: its
+    last half is at rest.
+    """
     ramp_s = default_ramp_s(params.rate_deg_s, context.bench, ACCELERATION_SHARE)
     rest_s = rest_with_demands(REST_S, context.bench, turns=2)
     return params.filled({"ramp_s": ramp_s, "rest_s": rest_s})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Axis x, y, z upwards, one turn each. Raises `BadParameter` where the rate would not be reached."""
+    """Return the stations: axis x, y, z upwards, one turn each. Raises `BadParameter` where the rate would not be
+    reached.
+    """
     turn = _turn(params)
     if params.rest_s is None:
         raise BadParameter("rest_s", None, "resolve the parameters first: the rest comes from the bench")
@@ -76,7 +80,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration. Raises `BadParameter` where the table cannot turn so."""
+    """Return the duration. Raises `BadParameter` where the table cannot turn so."""
     params = resolve(params, context)
     stations = schedule(params)
     require_rest("rest_s", params.rest_s, context.bench, turns=2)
@@ -86,13 +90,15 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Move, settle, record while the table turns once and rests, axis after axis."""
+    """Move, settle, record while the table turns once and rests, axis after axis; yield the stream of each."""
     for station in stations:
         yield await steps.record_turn(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Answers of each channel to each axis. Raises `UnfitRecording`, `MissingChannel`."""
+    """Return the answers of each channel to each axis, and what they mean. Raises `UnfitRecording`,
+    `MissingChannel`.
+    """
     turned_s, gravity = _turn(resolve(params, context)).duration_s, context.bench.site.gravity_m_s2
     found = tuple(answers(recordings, triad, turned_s, gravity) for triad in TRIAD_NAMES)
     said, checks = sentences(found), tuple(c for a in found for c in _checks(a, params.limits))
@@ -100,12 +106,12 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def quantities(_params: Params, _context: Context) -> tuple[str, ...]:
-    """Names of the checks that a result will have."""
+    """Return the names of the checks that a result will have."""
     return tuple(f"{name}: {what}" for triad in TRIAD_NAMES for name in TRIADS[triad] for what in (OWN, OTHERS))
 
 
 def report(result: Result) -> Report:
-    """Answers of every channel to every axis."""
+    """Return the report: the answers of every channel to every axis."""
     rows = tuple(
         (name, axis, *row)
         for a in result.triads

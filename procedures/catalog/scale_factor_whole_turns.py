@@ -104,7 +104,9 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Ramps, site and table accuracy from the bench; the reference rate from the rates."""
+    """Return the parameters with ramps, site and table accuracy from the bench, and the reference rate from the
+    rates.
+    """
     site, accuracy = context.bench.site, context.bench.accuracy
     fastest = max(params.rates_deg_s)
     defaults = {
@@ -120,12 +122,12 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Axis x, y, z; for each every rate forth and back, one station each."""
+    """Return the stations: axis x, y, z; for each every rate forth and back, one station each."""
     return _program(params).stations()
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Predict the duration, every coefficient's uncertainty, and if 3σ of the scale factor comes within its limit.
+    """Return the duration, every coefficient's uncertainty, and whether 3σ of the scale factor comes within its limit.
 
     Raises `Undetermined` where the rates cannot separate the terms, `BadParameter` where the table cannot turn so.
     """
@@ -154,13 +156,15 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Move, settle, record while the table turns, station after station."""
+    """Move, settle, record while the table turns, station after station; yield the stream of each."""
     for station in stations:
         yield await steps.record_turn(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Generalised least squares over the integrated outputs of all stations."""
+    """Return the scale factors by generalised least squares over the integrated outputs of all stations. Raises
+    `UnfitRecording`, `Undetermined`.
+    """
     params = resolve(params, context)
     plan = _plan(params, context)
     found = analyse_turns(
@@ -182,12 +186,12 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """The gyro triad where that was asked for."""
+    """Return the calibration of the gyro triad where the parameters ask for it."""
     return (result.gyro.calibration,) if result.make_calibration else ()
 
 
 def report(result: Result) -> Report:
-    """Coefficients, scale factor over the rates, checks."""
+    """Return the report: coefficients, scale factor over the rates, checks."""
     found = result.gyro
     figures, budgets = pictures.rate_figures(found), budget_tables("gyro", found.budgets)
     return Report(sections=(pictures.turns_table(found), *figures, *budgets, pictures.rate_table(found)))
@@ -230,7 +234,7 @@ def _warnings(params: Params, plan: TurnPlan) -> tuple[str, ...]:
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
-    """Checks of the three standard uncertainties of each scale factor, by the plan, and on the terms."""
+    """Return the planned checks of three standard uncertainties of each scale factor, and on the terms."""
     params = resolve(params, context)
     made = _plan(params, context).estimator()
     if made is None:

@@ -78,12 +78,12 @@ class Result(NoiseResult):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Nothing depends on unit or bench."""
+    """Return the parameters as they are: nothing depends on unit or bench."""
     return params
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Stations of the run, one a launch."""
+    """Return the stations of the run, one a launch."""
     angles = TableAngles(params.outer_deg, params.middle_deg, params.inner_deg)
     return tuple(
         Station(
@@ -102,7 +102,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Predict the duration, and the uncertainty of each expected coefficient after all launches."""
+    """Return the duration, and the uncertainty of each expected coefficient after all launches."""
     stations = schedule(params)
     duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
     found: list[PredictedUncertainty] = []
@@ -129,23 +129,25 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Off, on, turn to the orientation, record; launch after launch."""
+    """Switch off and on, turn to the orientation, record, launch after launch; yield the stream of each."""
     for station in stations:
         yield await steps.record_station(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Analyse each launch on its own, then all of them together."""
+    """Return the noise of each launch on its own, and of all of them together. Raises `UnfitRecording`,
+    `MissingChannel`.
+    """
     return analyse_launches(Result, recordings, params, context.unit)
 
 
 def report(result: Result) -> Report:
-    """Tables 4.1 and 4.2 of the thesis, and the plots behind them."""
+    """Return the report: tables 4.1 and 4.2 of the thesis, and the plots behind them."""
     return noise_report(result.launches, result.channels, result.averaging_time_s, result.drawn_launch)
 
 
 def learns(result: Result, unit: Unit, origin: str) -> Unit:
-    """Update the unit's record with the noise and the averaging time found, for later previews and dwells.
+    """Return the unit's record with the noise and the averaging time found, for later previews and dwells.
 
     A process that no launch shows enters with the mean square that its upper limit leaves likely, and is named.
     """
@@ -170,7 +172,7 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Checks that a result will have; for channels in counts only that there is noise."""
+    """Return the names of the checks that a result will have; for channels in counts only that there is noise."""
     rates = [(c.name, c.rate_unit) for c in context.unit.channels if c.rate_unit in ("rad/s", "m/s^2")]
     walks = [f"{name} random walk" for name, unit in rates if unit == "rad/s"]
     if not rates:
@@ -185,7 +187,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
-    """Checks of the noise coefficients, the mean over the launches."""
+    """Return the planned checks of the noise coefficients, the mean over the launches."""
     return tuple(noise_checks(params.noise_limits, context.unit, params.duration_s, params.launches))
 
 

@@ -74,7 +74,9 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """The program from the positions or the thesis; the axes' motion from the bench."""
+    """Return the parameters with the program from the positions or the thesis, and the axes' motion from the bench.
+    Raises `BadParameter`.
+    """
     if params.program is not None and params.positions is not None:
         raise BadParameter("positions", len(params.positions), "not together with a program: give one of the two")
     if len(set(params.axes)) < len(params.axes):
@@ -87,7 +89,8 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Stations of the program, one a dwell, in order, labelled by the program's line. The table starts from its zero.
+    """Return the stations of the program, one a dwell, in order, labelled by the program's line. The table starts from
+    its zero.
 
     Raises `BadParameter` "program" for a line outside the dialect, and for a delay that moving and settling use up.
     """
@@ -102,7 +105,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration, and the standard uncertainty of each channel's mean over the shortest dwell."""
+    """Return duration, and the standard uncertainty of each channel's mean over the shortest dwell."""
     params = resolve(params, context)
     stations = schedule(params)
     spans = windows(stations, context.bench.axis_motion)
@@ -123,13 +126,15 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Move, settle, record, dwell after dwell."""
+    """Move, settle, record, dwell after dwell; yield the stream of each."""
     for station in stations:
         yield await steps.record_station(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Means of every channel at every dwell. Raises `UnfitRecording` where the recordings are of another program."""
+    """Return the means of every channel at every dwell. Raises `UnfitRecording` where the recordings are of another
+    program.
+    """
     params = resolve(params, context)
     dwells = dwell_records(recordings, schedule(params), context.unit)
     checks = tuple(_whole(d) for d in dwells)
@@ -140,7 +145,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def report(result: Result) -> Report:
-    """Table of every channel's mean, a row a dwell, and one of the standard uncertainties."""
+    """Return the report: every channel's mean, a row a dwell, and a table of the standard uncertainties."""
     names = [(m.channel, *units.DISPLAY.get(m.unit, (m.unit, 1.0))) for m in result.dwells[0].means]
     columns = ("dwell", *(f"{name}, {unit}" for name, unit, _ in names))
     means = tuple(

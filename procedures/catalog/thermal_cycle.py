@@ -89,12 +89,12 @@ class Params(JudgedParameters):
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
     def profile(self) -> TemperatureProfile:
-        """Convert to the profile of the bench. Raises `BadParameter`."""
+        """Return the profile that the bench drives. Raises `BadParameter`."""
         legs = tuple(ProfileLeg(**leg.model_dump()) for leg in self.legs)
         return TemperatureProfile(legs, SoakCriterion(**self.soak.model_dump()), self.unit_margin_c)
 
     def settings(self) -> CycleSettings:
-        """Convert to the settings of the numerics. Raises `BadParameter`."""
+        """Return the settings of the numerics. Raises `BadParameter`."""
         return CycleSettings(
             cell_s=self.cell_s,
             case_lag_s=self.case_lag_s,
@@ -116,12 +116,12 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Gravity at the site of the bench."""
+    """Return the parameters with gravity at the site of the bench."""
     return params.filled({"gravity_m_s2": context.bench.site.gravity_m_s2})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Stations of the cycle, one a run, x, y and z up; `record_s` is the longest that it may take."""
+    """Return the stations of the cycle, one a run, x, y and z up; `record_s` is the longest that it may take."""
     profile = params.profile()
     return tuple(
         Station(
@@ -139,7 +139,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Predict the duration and name what is missing. Raises `BadParameter` where the cycle could give nothing."""
+    """Return the duration and name what is missing. Raises `BadParameter` where the cycle could give nothing."""
     params.settings()
     _require_possible(params, context)
     basis = (
@@ -153,7 +153,7 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Off, set by hand, rest, on, record along the profile; run after run."""
+    """Switch off, set by hand, rest, switch on, record along the profile, run after run; yield the stream of each."""
     for station in stations:
         axis = station.label.split()[0]
         request = f"Open the chamber, set the unit with its {axis} axis upwards and level, close the door."
@@ -161,7 +161,9 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Read each run once, block by block; then fit all of them together, and judge the correction."""
+    """Read each run once, block by block; fit all of them together, and return the judged correction. Raises
+    `UnfitRecording`, `MissingChannel`.
+    """
     params = resolve(params, context)
     _require_correction(params, context)
     site = site_with(context.bench.site, None, params.gravity_m_s2, None, None)
@@ -187,7 +189,9 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def corrections(result: Result) -> tuple[UnitCorrection, ...]:
-    """The correction that was fitted, and one of gyros that depend on temperature; none where the own was judged."""
+    """Return the correction that was fitted, and one of gyros that depend on temperature; none where the unit's own was
+    judged.
+    """
     if result.cycle.judged != "fit":
         return ()
     gyros = result.cycle.gyro_correction
@@ -196,7 +200,7 @@ def corrections(result: Result) -> tuple[UnitCorrection, ...]:
 
 
 def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
-    """Kinds of corrections used: sensors and stage one first, and the unit's own for comparison.
+    """Return the kinds of corrections used: sensors and stage one first, and the unit's own for comparison.
 
     Where the unit's own is judged, stage one and sensors are those that it was fitted with: parts of it.
     """
@@ -206,7 +210,7 @@ def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
 
 
 def report(result: Result) -> Report:
-    """Report with Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, reworded."""
+    """Return the report with Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, reworded."""
     cycle = result.cycle
     return Report(thermal_tables.summary(cycle), (*thermal_tables.tables(cycle), *thermal_figures.figures(cycle)))
 
@@ -251,7 +255,10 @@ def _require_possible(params: Params, context: Context) -> None:
 def _require_correction(params: Params, context: Context) -> None:
     if params.correction == "current" and context.unit.thermal_correction is None:
         why = context.unit.why_withheld("thermal")
-        own = why or f"unit {context.unit.serial} has no thermal correction to judge"
+        own = why or (
+            f"unit {context.unit.serial} has no current thermal correction to judge; one that failed counts only where "
+            "it is chosen"
+        )
         raise BadParameter("correction", "current", own)
 
 

@@ -89,7 +89,7 @@ class Params(JudgedParameters):
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
     def settings(self) -> SoakSettings:
-        """Convert to the settings of the numerics. Raises `BadParameter` where the chamber's accuracy is not known."""
+        """Return the settings of the numerics. Raises `BadParameter` where the chamber's accuracy is not known."""
         if self.place_sd_c is None or self.soak_sd_c is None:
             raise BadParameter(
                 "place_sd_c",
@@ -113,13 +113,15 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """The chamber's accuracy from the bench's declaration."""
+    """Return the parameters with the chamber's accuracy as the bench declares it."""
     known = context.bench.chamber_accuracy
     return params if known is None else params.filled({"place_sd_c": known.place_sd_c, "soak_sd_c": known.soak_sd_c})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station a soak; each is a launch. Raises `BadParameter` for a temperature twice in a row, or fewer than 3."""
+    """Return one station a soak; each is a launch. Raises `BadParameter` for a temperature twice in a row, or fewer
+    than 3.
+    """
     pairs = zip(params.temperatures_c, params.temperatures_c[1:], strict=False)
     if any(a == b for a, b in pairs) or len(set(params.temperatures_c)) < 3:
         raise BadParameter(
@@ -146,7 +148,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Predict duration and uncertainties. Raises `BadParameter` where the chamber's accuracy is not known."""
+    """Return duration and uncertainties. Raises `BadParameter` where the chamber's accuracy is not known."""
     settings, targets = params.settings(), np.array(params.temperatures_c)
     sd = np.full((len(SENSORS), len(targets)), EXPECTED_READING_SD_C)
     expected = calibrate(Soaked(SENSORS, targets, targets, np.tile(targets, (len(SENSORS), 1)), sd), settings)
@@ -160,13 +162,17 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Off, soak, on, record the first moments; temperature after temperature."""
+    """Switch off, soak, switch on, record the first moments, temperature after temperature; yield the stream of
+    each.
+    """
     for station in stations:
         yield await chamber_steps.record_cold_start(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Readings at the moment of switching on against the chamber's air; a line for each sensor."""
+    """Return a line for each sensor, from readings at the moment of switching on against the chamber's air. Raises
+    `UnfitRecording`.
+    """
     params = resolve(params, context)
     settings = params.settings()
     soaked = read_soaks(recordings, settings)
@@ -183,7 +189,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def planned_checks(params: Params, _context: Context) -> tuple[PlannedCheck, ...]:
-    """Tests of significance that a result will have, each with the chance that a sound unit fails it."""
+    """Return the tests of significance that a result will have, each with the chance that a sound unit fails it."""
     level, source = params.limits.level, "ours: a test of significance"
     each = Limit("1", minimum=level / len(SENSORS), source=source)
     found = [PlannedCheck(f"{name} {LINE}", each, level=level / len(SENSORS)) for name in SENSORS]
@@ -225,17 +231,17 @@ def _warnings(params: Params, settings: SoakSettings) -> tuple[str, ...]:
 
 
 def corrections(result: Result) -> tuple[UnitCorrection, ...]:
-    """The correction set of the thermometers."""
+    """Return the correction set of the thermometers for the unit's history."""
     return (UnitCorrection("thermometers", result.thermometers.correction),)
 
 
 def report(result: Result) -> Report:
-    """Offsets and slopes, errors at the soaks, up against down, and the lines with the data."""
+    """Return the report: offsets and slopes, errors at the soaks, up against down, and the lines with the data."""
     return thermometer_report(result.thermometers, result.target_c, result.air_c)
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Checks that a result will have."""
+    """Return the names of the checks that a result will have."""
     each = [f"{name} {of}" for name in SENSORS for of in ("offset", "slope")]
     return (*each, *(f"{name} is a straight line, p-value" for name in SENSORS))
 

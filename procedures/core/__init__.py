@@ -1,1 +1,3 @@
-"""Pure numbers and value types: numpy and scipy only. The floor of everything; knows no device, no file, no clock."""
+"""Pure numbers and value types: numpy and scipy only. Lowest layer of `procedures`; knows no device, no file, no
+clock.
+"""

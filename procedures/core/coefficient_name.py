@@ -8,7 +8,9 @@ from typing import Any
 
 
 class CoefficientName(str):
-    """The dotted text, with the triad and the symbol that it names. Made from both; read once from stored JSON."""
+    """Dotted text such as "gyro.b_x", with the triad and the symbol that it names. Made from both; read once from
+    stored JSON.
+    """
 
     __slots__ = ("symbol", "triad")
     triad: str
@@ -26,7 +28,7 @@ class CoefficientName(str):
 
     @classmethod
     def of_text(cls, text: str) -> "CoefficientName":
-        """The name that a stored text is. Raises `ValueError` where it names no triad."""
+        """Return the name that a stored text states. Raises `ValueError` where it names no triad."""
         triad, dot, symbol = text.partition(".")
         if not (triad and dot and symbol):
             raise ValueError(f"{text!r} is not the name of a triad's coefficient, such as gyro.b_x")

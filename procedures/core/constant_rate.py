@@ -34,7 +34,7 @@ class ConstantRate:
 
     @property
     def angle_deg(self) -> float:
-        """The angle covered, signed: ``rate·(duration − ramp)`` [deg]."""
+        """Angle that the axis turns, signed: ``rate·(duration − ramp)`` [deg]."""
         return self.rate_deg_s * (self.duration_s - self.ramp_s)
 
     @property

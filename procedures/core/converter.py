@@ -30,18 +30,20 @@ class Normalised:
     residual_sd: float
 
     def function(self, temperature_c: Array) -> Array:
-        """F at temperatures (n,): 1 or 0 at the reference."""
+        """Return F at temperatures (n,) [°C]: 1 or 0 at the reference."""
         departure = temperature_c - self.reference_c
         powers = [a * departure ** (k + 1) for k, a in enumerate(self.coefficients)]
         return np.sum(powers, axis=0) + (1.0 if self.relative else 0.0)
 
     def value(self, temperature_c: Array) -> Array:
-        """The whole value at temperatures (n,)."""
+        """Return the whole value at temperatures (n,) [°C], (n,)."""
         f = self.function(temperature_c)
         return self.at_reference * f if self.relative else self.at_reference + f
 
     def largest_change(self, low_c: float, high_c: float) -> float:
-        """Largest change from the reference within a range [°C], in the unit of the values (Δmax of paper C)."""
+        """Return the largest change from the reference within a range [°C], in the unit of the values (Δmax of paper
+        C).
+        """
         grid = np.linspace(low_c, high_c, 1001)
         return float(np.max(np.abs(self.value(grid) - self.at_reference)))
 
@@ -56,11 +58,11 @@ class ConverterModel:
     """Zero N0 [codes] and Fs, the change."""
 
     def code(self, current_ma: ArrayLike, temperature_c: Array) -> Array:
-        """Output code of the channel before rounding, at temperatures (n,) [°C]."""
+        """Return the output codes of the channel before rounding, (n,), at temperatures (n,) [°C]."""
         return self.scale.value(temperature_c) * np.asarray(current_ma) + self.zero.value(temperature_c)
 
     def current_ma(self, code: Array, temperature_c: Array) -> Array:
-        """Input current of codes (n,) at temperatures (n,), for stage two."""
+        """Return the input currents [mA] of codes (n,) at temperatures (n,) [°C], for stage two."""
         return (code - self.zero.value(temperature_c)) / self.scale.value(temperature_c)
 
 

@@ -18,7 +18,7 @@ class DomainError(Exception):
 
 
 class BadParameter(DomainError):
-    """A parameter's value is not allowed."""
+    """Raised where a parameter's value is not allowed; names the field, its value and what is allowed."""
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
         super().__init__(f"{field} = {value!r}: {allowed}")
@@ -28,7 +28,7 @@ class BadParameter(DomainError):
 
 
 class Undetermined(DomainError):
-    """A set of orientations cannot determine every parameter; no numbers come out."""
+    """Raised where a set of orientations cannot determine every parameter; no numbers come out."""
 
     def __init__(self, what: str, lost: Sequence[str], rank: int, wanted: int, condition: float) -> None:
         super().__init__(
@@ -41,11 +41,11 @@ class Undetermined(DomainError):
 
 
 class UnfitRecording(DomainError):
-    """A recording cannot be analysed as asked."""
+    """Raised where a recording cannot be analysed as asked; the message has the reason."""
 
 
 class MissingChannel(DomainError):
-    """A recording lacks a channel that is needed."""
+    """Raised where a recording lacks a channel that is needed; names it and those that are there."""
 
     def __init__(self, name: str, present: Sequence[str]) -> None:
         super().__init__(f"the recording has no channel {name!r}; it has {', '.join(present) or 'none'}")
@@ -54,11 +54,11 @@ class MissingChannel(DomainError):
 
 
 class NoCalibration(DomainError):
-    """A triad of the unit has no calibration, or its current one was rejected or has expired."""
+    """Raised where a triad of the unit has no calibration, or its current one was rejected or has expired."""
 
 
 class UnfitResult(DomainError):
-    """A result has a value that cannot be stored, such as a number that is not finite."""
+    """Raised where a result has a value that cannot be stored, such as a number that is not finite."""
 
     def __init__(self, field: str, value: object, needed: str) -> None:
         super().__init__(f"{field} = {value!r}: {needed}")
@@ -67,4 +67,4 @@ class UnfitResult(DomainError):
 
 
 class ProcedureDefect(DomainError):
-    """A procedure does not do what its place in the catalogue promises; its author must change it."""
+    """Raised where a procedure does not do what its place in the catalogue promises; its author must change it."""

@@ -1,7 +1,7 @@
 """Attitudes of the unit on the table, and gravity and the Earth's rotation in its axes.
 
-This is the *judge's* geometry: commanded angles through ideal, orthogonal axes. The simulated table
-has its own kinematics (MuJoCo bodies) and shares nothing with this file.
+This is the geometry that the *analysis* uses: commanded angles through ideal, orthogonal axes. The simulated table has
+its own kinematics (MuJoCo bodies) and shares nothing with this file.
 """
 
 import numpy as np
@@ -14,7 +14,8 @@ from procedures.core.table_angles import TableAngles
 
 
 def table_rotation(angles: TableAngles) -> Rotation:
-    """Attitude of the unit for ideal axes, ``rot_rb = R_y(outer) · R_z(middle) · R_x(inner)`` (see `procedures`).
+    """Return the attitude of the unit for ideal axes, ``rot_rb = R_y(outer) · R_z(middle) · R_x(inner)`` (see
+    `procedures`).
 
     In the thesis's (β, γ): inner = β, middle = γ, so ``v_b = R_x(β)ᵀ · R_z(γ)ᵀ · v_r``.
     """
@@ -22,7 +23,7 @@ def table_rotation(angles: TableAngles) -> Rotation:
 
 
 def orientation_beta_gamma(beta_deg: float, gamma_deg: float) -> TableAngles:
-    """Table angles of a thesis orientation: β about x *after* γ about z (thesis 5.1, figure 5.4)."""
+    """Return the table angles of a thesis orientation: β about x *after* γ about z (thesis 5.1, figure 5.4)."""
     return TableAngles(0.0, gamma_deg, beta_deg)
 
 
@@ -37,12 +38,14 @@ def orientation_gamma_beta(beta_deg: float, gamma_deg: float) -> TableAngles:
 
 
 def reference_rotation(azimuth_deg: float) -> Rotation:
-    """Rotation ``rot_nr`` from reference axes to local level: a clockwise azimuth is a turn of −azimuth about up."""
+    """Return the rotation ``rot_nr`` from reference axes to local level: a clockwise azimuth is a turn of −azimuth
+    about up.
+    """
     return Rotation.from_euler("y", -azimuth_deg, degrees=True)
 
 
 def specific_force_b(angles: list[TableAngles], site: Site) -> Array:
-    """Specific force of a unit at rest in its own axes, shape (n, 3) [m/s²]: ``rot_rbᵀ · [0, g, 0]``."""
+    """Return the specific force of a unit at rest in its own axes, shape (n, 3) [m/s²]: ``rot_rbᵀ · [0, g, 0]``."""
     up_r = np.array([0.0, site.gravity_m_s2, 0.0])
     return np.array([table_rotation(a).inv().apply(up_r) for a in angles]).reshape(-1, 3)
 
@@ -52,14 +55,16 @@ LEVEL_SHARE = 0.99
 
 
 def upward_axis(angles: TableAngles) -> int | None:
-    """Index of the unit's axis that stands upwards, 0 … 2; None where none has `LEVEL_SHARE` of gravity along it."""
+    """Return the index of the unit's axis that stands upwards, 0 … 2; None where none has `LEVEL_SHARE` of gravity
+    along it.
+    """
     up_b = table_rotation(angles).inv().apply(np.array([0.0, 1.0, 0.0]))
     upmost = int(np.argmax(up_b))
     return upmost if up_b[upmost] >= LEVEL_SHARE else None
 
 
 def earth_rate_b(angles: list[TableAngles], site: Site) -> Array:
-    """Earth's angular velocity in the unit's axes, shape (n, 3) [rad/s].
+    """Return the Earth's angular velocity in the unit's axes, shape (n, 3) [rad/s].
 
     ``rot_rbᵀ · rot_nrᵀ · Ω · [cos L, sin L, 0]`` (Groves 2nd ed., 2.4.1, in north-up-east order).
     """

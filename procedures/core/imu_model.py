@@ -20,7 +20,9 @@ COEFFICIENT_NAMES = tuple(name for i in (1, 2, 3) for name in (f"b_{'xyz'[i - 1]
 
 
 def coefficient_unit(name: str, output_unit: str, input_unit: str) -> str:
-    """Unit of b is the output's; of K "1" where output and input have the same unit."""
+    """Return the unit of a coefficient as text: of b the output's; of K "1" where output and input have the same
+    unit.
+    """
     if name.startswith("b"):
         return output_unit
     return "1" if output_unit == input_unit else f"{output_unit}/({input_unit})"
@@ -69,12 +71,12 @@ class TriadCalibration:
 
     @property
     def covariance_array(self) -> Array:
-        """Covariance of all twelve, shape (12, 12)."""
+        """Covariance of all twelve coefficients, shape (12, 12), in the order of `COEFFICIENT_NAMES`."""
         return np.array(self.covariance, dtype=np.float64)
 
     @property
     def coefficients(self) -> Array:
-        """All twelve in the order of `COEFFICIENT_NAMES`, shape (12,)."""
+        """All twelve coefficients in the order of `COEFFICIENT_NAMES`, shape (12,)."""
         return np.column_stack([self.bias_array, self.matrix_array]).ravel()
 
     @property
@@ -100,7 +102,9 @@ def triad_calibration(
     covariance: ArrayLike,
     model: str = "linear",
 ) -> TriadCalibration:
-    """A calibration from arrays: `coefficients` shape (12,), `covariance` shape (12, 12), both ordered as named."""
+    """Return a calibration made from arrays: `coefficients` shape (12,), `covariance` shape (12, 12), both ordered as
+    named.
+    """
     by_channel = np.asarray(coefficients, dtype=np.float64).reshape(3, 4)
     return TriadCalibration(
         triad,
@@ -114,7 +118,7 @@ def triad_calibration(
 
 
 def correct(output: Array, calibration: TriadCalibration) -> Array:
-    """Corrected vectors ``v̂ = K⁻¹(U − b)``, shape of `output`, (3,) or (n, 3) (thesis 3.36, 3.37)."""
+    """Return corrected vectors ``v̂ = K⁻¹(U − b)``, shape of `output`, (3,) or (n, 3) (thesis 3.36, 3.37)."""
     centred = np.atleast_2d(output) - calibration.bias_array
     corrected = np.asarray(np.linalg.solve(calibration.matrix_array, centred.T).T, dtype=np.float64)
     return corrected.reshape(output.shape)

@@ -57,7 +57,7 @@ class Decision:
 
     @property
     def sentence(self) -> str:
-        """The decision for a reader: rule, U with its factor and degrees of freedom, outcome."""
+        """Sentence on the decision for a reader: rule, U with its factor and degrees of freedom, outcome."""
         if self.expanded_uncertainty is None:
             return f"{self.rule}: {self.outcome}"
         freedom = "" if self.degrees_of_freedom is None else f", ν = {self.degrees_of_freedom:.3g}"
@@ -67,7 +67,9 @@ class Decision:
 
 
 def coverage_factor(probability: float, degrees_of_freedom: float | None) -> float:
-    """Student's factor k of a two-sided interval (JCGM 100, G.3); normal where no degrees of freedom are given."""
+    """Return Student's factor k of a two-sided interval (JCGM 100, G.3); normal where no degrees of freedom are
+    given.
+    """
     from scipy.special import ndtri, stdtrit  # a start does without it
 
     tail = 0.5 * (1.0 + probability)
@@ -87,7 +89,7 @@ def combined_freedom(parts: list[tuple[float, float | None]]) -> float | None:
 
 
 def inside(value: float, minimum: float | None, maximum: float | None) -> float:
-    """Distance of a value from the nearer limit; negative outside, and for no finite value."""
+    """Return the distance of a value from the nearer limit; negative outside, and for no finite value."""
     below = inf if maximum is None else maximum - value
     above = inf if minimum is None else value - minimum
     found = min(below, above)
@@ -95,7 +97,8 @@ def inside(value: float, minimum: float | None, maximum: float | None) -> float:
 
 
 def decide(distance: float, passed: bool, u: float | None, degrees_of_freedom: float | None, rule: Rule) -> Decision:
-    """Decide on a value `distance` inside its limit, `passed` by simple acceptance, of standard uncertainty u.
+    """Return the decision on a value `distance` inside its limit, `passed` by simple acceptance, of standard
+    uncertainty u.
 
     A value without a known uncertainty is accepted simply under either rule, and the decision says so.
     """
@@ -133,7 +136,7 @@ class Limit:
 
 
 def bounds(minimum: float | None, maximum: float | None, unit: str) -> str:
-    """Format the requirement for a reader: ≥ 1 and ≤ 2 deg/h."""
+    """Return the requirement as text for a reader: ≥ 1 and ≤ 2 deg/h."""
     found = [f"≥ {minimum:g}"] if minimum is not None else []
     found += [f"≤ {maximum:g}"] if maximum is not None else []
     return f"{' and '.join(found)} {unit}"
@@ -194,7 +197,7 @@ def check(
     degrees_of_freedom: float | None = None,
     bound: bool = False,
 ) -> Check:
-    """Compare a value with its limit by simple acceptance. A value that is not finite never passes.
+    """Return the check of a value against its limit by simple acceptance. A value that is not finite never passes.
 
     `bound`: nothing was observed, and the value is what it stays below.
     """
@@ -207,13 +210,15 @@ def check(
 
 
 def significance(name: str, p_value: float, level: float, note: str = "", source: str = "") -> Check:
-    """Test of significance at a level: fails where the p-value is below it. Such a value has no uncertainty."""
+    """Return the check of a test of significance at a level: it fails where the p-value is below it. Such a value has
+    no uncertainty.
+    """
     limit = Limit("1", minimum=level, source=source or "ours: a test of significance")
     return replace(check(name, p_value, limit, note=note), significance=True)
 
 
 def decided(made: Check, rule: Rule) -> Check:
-    """The check under a decision rule, which can make a pass a fail, never the reverse."""
+    """Return the check under a decision rule, which can make a pass a fail, never the reverse."""
     if made.bound:
         return replace(made, decision=Decision(BOUND_RULE, "pass" if made.passed else "inconclusive"))
     if made.significance:
@@ -225,7 +230,9 @@ def decided(made: Check, rule: Rule) -> Check:
 
 
 def verdict(checks: Iterable[Check]) -> Verdict:
-    """Pass where every check passed, fail where one failed, else error: a check is inconclusive, or there is none."""
+    """Return the verdict over all checks: pass where every one passed, fail where one failed, else error: a check is
+    inconclusive, or there is none.
+    """
     made = tuple(checks)
     if any(not c.passed and not c.inconclusive for c in made):
         return Verdict.FAIL

@@ -1,4 +1,4 @@
-"""Readings of table and supply over a recording, beside what was commanded of them."""
+"""Readings of the devices while a recording was made, with which commanded values are compared."""
 
 from dataclasses import dataclass
 
@@ -41,6 +41,17 @@ class MeasuredEnvironment:
 
 
 @dataclass(frozen=True)
+class MeasuredPace:
+    """Pace of a unit's samples over wires, by the bench's clock."""
+
+    behind_s: float
+    """Time by which the samples fell behind the clock over the recording [s]: their number over the declared rate is
+    less than the time that passed; negative: they came faster."""
+    scatter_s: float
+    """Scatter of the moments at which samples came [s]: what holds a block up, and no loss."""
+
+
+@dataclass(frozen=True)
 class Measured:
     """Readings of the devices around the unit while a recording was made; None: not read."""
 
@@ -49,3 +60,5 @@ class Measured:
     environment: MeasuredEnvironment | None = None
     status: tuple[str, ...] = ()
     """Status words of table, supply and unit that were read meanwhile, each once, by first appearance."""
+    pace: MeasuredPace | None = None
+    """None: the unit is simulated in process, where its samples are the clock, or the recording is too short."""

@@ -64,7 +64,7 @@ angles of the table, and the ages of its readings."""
 
 @dataclass(frozen=True)
 class Channel:
-    """Channel of a recording. `unit` is that of ``scale·(raw − offset)``."""
+    """Channel of a recording: name, quantity, unit of ``scale·(raw − offset)``, scale and offset."""
 
     name: str
     quantity: Quantity
@@ -90,7 +90,7 @@ class Channel:
         return {"rad": "rad/s", "m/s": "m/s^2"}.get(self.unit, self.unit) if self.quantity in INCREMENTS else self.unit
 
     def value(self, raw: V) -> V:
-        """``scale·(raw − offset)`` in the channel's `unit`, of a number or of an array."""
+        """Return ``scale·(raw − offset)`` in the channel's `unit`, of a number or of an array."""
         return (raw - self.offset) * self.scale
 
 
@@ -105,13 +105,13 @@ class NominalScale:
 
     @classmethod
     def of(cls, channels: Sequence[Channel], rate_hz: float) -> "NominalScale":
-        """The conversion of these channels at a sample rate [Hz]."""
+        """Return the conversion of these channels at a sample rate [Hz]."""
         per_second = (rate_hz if c.quantity in INCREMENTS else 1.0 for c in channels)
         gain = np.array([c.scale * factor for c, factor in zip(channels, per_second, strict=True)])
         return cls(gain, np.array([c.offset for c in channels]))
 
     def rates(self, raw: Array) -> Array:
-        """Nominal rates of raw values (…, channels)."""
+        """Return the nominal rates of raw values (…, channels), each in its channel's `rate_unit`."""
         return (raw - self.offset) * self.gain
 
     def convert_rows(self, rows: Array) -> None:
@@ -180,25 +180,27 @@ class RecordingInfo:
         return self.start_s - (self.launched_s or 0.0)
 
     def column(self, name: str) -> int:
-        """Index of a channel by name. Raises `MissingChannel`."""
+        """Return the index of a channel by name, from 0. Raises `MissingChannel`."""
         for index, channel in enumerate(self.channels):
             if channel.name == name:
                 return index
         raise MissingChannel(name, tuple(c.name for c in self.channels))
 
     def nominal_scale(self, names: Sequence[str]) -> NominalScale:
-        """Conversion of raw samples of some channels to nominal rates. Raises `MissingChannel`."""
+        """Return the conversion of raw samples of some channels to nominal rates. Raises `MissingChannel`."""
         return NominalScale.of([self.channels[self.column(name)] for name in names], self.rate_hz)
 
 
 class Recording(Protocol):
-    """Samples that can be read again and again, block by block."""
+    """Samples that can be read again and again, block by block. Interface: in memory, or over the service's
+    database.
+    """
 
     @property
     def info(self) -> RecordingInfo: ...
 
     def blocks(self) -> Iterator[RawArray]:
-        """The raw samples in order, each block (n, channels)."""
+        """Yield the raw samples in order, each block (n, channels)."""
         ...
 
 
@@ -215,7 +217,7 @@ class MemoryRecording:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples `start` … `stop` (half open) of another recording."""
+    """Recording of the samples `start` … `stop` (half open) of another recording."""
 
     info: RecordingInfo
     whole: Recording
@@ -234,7 +236,8 @@ class Stretch:
 
 
 def cut(recording: Recording, start_s: float | None, stop_s: float | None) -> Recording:
-    """A recording from one second of it to another; None: from its beginning, to its end. Its id and hash stay.
+    """Return the recording from one second of it to another; None: from its beginning, to its end. Its id and hash
+    stay.
 
     Raises `BadParameter` where nothing lies between them, or where the recording is shorter.
     """
@@ -254,8 +257,7 @@ def cut(recording: Recording, start_s: float | None, stop_s: float | None) -> Re
 
 
 def rates(recording: Recording, names: Sequence[str]) -> Array:
-    """All samples of some channels as nominal rates, shape (n, len(names)), in each channel's `rate_unit`.
-
+    """Return all samples of some channels as nominal rates, shape (n, len(names)), in each channel's `rate_unit`.
     Raises `MissingChannel`.
     """
     columns = [recording.info.column(name) for name in names]

@@ -1,4 +1,4 @@
-"""Report of a result for a reader: tables and figures as plain data, drawn by the service."""
+"""Report of a result for a reader: tables and figures as plain data; the service draws them."""
 
 from dataclasses import dataclass, field
 
@@ -30,7 +30,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Figure:
-    """Plot of a report; `note` is its caption."""
+    """Plot of a report as data: axes, series, and a caption in `note`."""
 
     title: str
     x_label: str

@@ -1,4 +1,4 @@
-"""Sinusoidal motion of one table axis: a value, without geometry. Maker and judge of data share it."""
+"""Sinusoidal motion of one table axis: a value, without geometry. Simulators and the analysis share it."""
 
 from dataclasses import dataclass
 from math import isfinite, pi

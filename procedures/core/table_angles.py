@@ -1,4 +1,4 @@
-"""Commanded angles of the table: a value, without geometry. Simulators and analyses share it, and nothing around it."""
+"""Commanded angles of the table: a value, without geometry. Simulators and analyses share it."""
 
 from dataclasses import dataclass
 

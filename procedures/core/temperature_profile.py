@@ -39,7 +39,7 @@ class SoakCriterion:
 
 @dataclass(frozen=True)
 class ProfileLeg:
-    """Go to an air temperature and stay until the unit has soaked."""
+    """One leg of a profile: go to an air temperature by a ramp, and stay until the unit has soaked."""
 
     target_c: float
     ramp_c_min: float
@@ -75,7 +75,7 @@ class TemperatureProfile:
 
     @property
     def longest_s(self) -> float:
-        """The longest that a run may take."""
+        """Longest time that a run may take, over all legs [s]."""
         return sum(leg.longest_s for leg in self.legs)
 
     @property
@@ -85,7 +85,9 @@ class TemperatureProfile:
         return min(targets), max(targets)
 
     def expected_s(self) -> float:
-        """Duration of a run in which each soak begins with the end of its ramp; the first leg begins at its target."""
+        """Return the duration [s] of a run in which each soak begins with the end of its ramp; the first leg begins at
+        its target.
+        """
         total, at = 0.0, self.legs[0].target_c
         for leg in self.legs:
             ramp_s = abs(leg.target_c - at) / leg.ramp_c_min * MINUTE_S
@@ -94,7 +96,7 @@ class TemperatureProfile:
         return total
 
     def violations(self, minimum_c: float, maximum_c: float, ramp_c_min: float) -> tuple[str, ...]:
-        """Violations of a chamber's limits, one sentence for each limit that a leg passes."""
+        """Return violations of a chamber's limits, one sentence for each limit that a leg passes."""
         found: list[str] = []
         for number, leg in enumerate(self.legs, start=1):
             if not minimum_c <= leg.target_c <= maximum_c:

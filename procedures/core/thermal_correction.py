@@ -43,7 +43,7 @@ class Form(StrEnum):
 
 
 def acting(form: Form, dynamic: ArrayLike) -> tuple[Array, Array]:
-    """Weights, 0 or 1, of the terms of Δt and of those of Δb, each of the shape of `dynamic`."""
+    """Return the weights, 0 or 1, of the terms of Δt and of those of Δb, each of the shape of `dynamic`."""
     is_dynamic = np.asarray(dynamic, dtype=np.float64)
     if form is Form.BOTH:
         return np.ones_like(is_dynamic), np.ones_like(is_dynamic)
@@ -53,7 +53,7 @@ def acting(form: Form, dynamic: ArrayLike) -> tuple[Array, Array]:
 
 
 def terms(form: Form, powers: tuple[tuple[int, int], ...], dt: Array, db: Array, dynamic: ArrayLike) -> Array:
-    """The columns that the coefficients multiply, (n, len(powers)) [°C or °C²]; `dt` and `db` (n,) [°C]."""
+    """Return the columns that the coefficients multiply, (n, len(powers)) [°C or °C²]; `dt` and `db` (n,) [°C]."""
     weights = acting(form, dynamic)
     return np.column_stack([weights[s] * (dt, db)[s] ** p for s, p in powers])
 
@@ -88,13 +88,17 @@ class AxisCorrection:
             raise BadParameter("covariance", np.shape(self.covariance), "(8, 8)")
 
     def standard_uncertainties(self) -> Array:
-        """Standard uncertainties of α1 … α4, β1 … β4, (8,). Raises `BadParameter` where no covariance is known."""
+        """Return the standard uncertainties of α1 … α4, β1 … β4, (8,). Raises `BadParameter` where no covariance is
+        known.
+        """
         if not self.covariance:
             raise BadParameter("covariance", self.covariance, "known, (8, 8)")
         return np.sqrt(np.diagonal(np.array(self.covariance)))
 
     def apply(self, output_m_s2: ArrayLike, case_c: ArrayLike, converter_c: ArrayLike, dynamic: ArrayLike) -> Array:
-        """Corrected specific force [m/s²] of nominal outputs at sensor temperatures [°C], all (n,) or numbers."""
+        """Return the corrected specific force [m/s²] of nominal outputs at sensor temperatures [°C], all (n,) or
+        numbers.
+        """
         v, t, b, s = np.broadcast_arrays(
             *(np.atleast_1d(np.asarray(x, dtype=np.float64)) for x in (output_m_s2, case_c, converter_c, dynamic))
         )
@@ -123,7 +127,9 @@ class TemperatureRange:
                 raise BadParameter(name, (low, high), "two finite temperatures, the lower one first")
 
     def beyond_c(self, case_c: ArrayLike, converter_c: ArrayLike) -> Array:
-        """Distance of readings outside the range, of the farther sensor; zero inside; shape of the readings [°C]."""
+        """Return the distance of readings outside the range, of the farther sensor; zero inside; shape of the readings
+        [°C].
+        """
         found = [
             np.maximum(low - np.asarray(t, dtype=np.float64), np.asarray(t, dtype=np.float64) - high)
             for t, (low, high) in ((case_c, self.case_c), (converter_c, self.converter_c))
@@ -157,11 +163,11 @@ class ThermalCorrection:
 
     @property
     def scales(self) -> Array:
-        """K0 of each axis, (3,)."""
+        """Scale K0 of each axis, (3,)."""
         return np.array([axis.scale for axis in self.axes])
 
     def apply(self, output_m_s2: Array, case_c: Array, converter_c: Array, dynamic: ArrayLike) -> Array:
-        """Corrected specific forces (n, 3) [m/s²] of nominal outputs (n, 3).
+        """Return corrected specific forces (n, 3) [m/s²] of nominal outputs (n, 3).
 
         `case_c` is (n,), or (n, 3) where each axis has a sensor of its own; `converter_c` (n,) [°C]; `dynamic` (n,) or
         one answer for all.

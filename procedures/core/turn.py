@@ -1,4 +1,4 @@
-"""Whole turns of one table axis: a value, without geometry. Maker and judge of data share it, and nothing around it."""
+"""Whole turns of one table axis: a value, without geometry. Simulators and the analysis share it."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -36,7 +36,7 @@ class Turn:
 
     @property
     def angle_deg(self) -> float:
-        """The whole turns, signed [deg]."""
+        """Angle of the whole turns, signed [deg]."""
         return 360.0 * self.turns
 
     @property

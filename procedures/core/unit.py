@@ -57,7 +57,8 @@ class TriadRecord:
         )
 
     def launch_covariance(self, outputs: Array) -> Array:
-        """Covariance by which outputs K·v (n, 3) of one launch depart from the unit's mean, per channel, (3, n, n).
+        """Return the covariance by which outputs K·v (n, 3) of one launch depart from the unit's mean, per channel, (3,
+        n, n).
 
         ``σ_b² + σ_s²·a_i·a_j``: the bias is common to all of them, and a scale factor carries its whole row of K.
         """
@@ -95,11 +96,11 @@ class UnitDeclaration:
 
 
 @dataclass(frozen=True)
-class WithheldCalibration:
+class Withheld:
     """A calibration or correction that would be in use, but was rejected or has expired."""
 
-    triad: str
-    """Triad of a calibration, or kind of a correction."""
+    subject: str
+    """Triad of a calibration ("gyro"), or kind of a correction ("gyros"): no triad has the name of a kind."""
     id: str
     why: str
     """Sentence that says why it is not used, and what to do."""
@@ -120,7 +121,7 @@ class Unit:
     """The current calibrations, at most one a triad; empty before the first."""
     calibration_ids: tuple[str, ...] = ()
     """Ids of the stored calibrations in use, in the order of `calibrations`."""
-    withheld: tuple[WithheldCalibration, ...] = field(default=(), repr=False)
+    withheld: tuple[Withheld, ...] = field(default=(), repr=False)
     """Current calibrations and corrections that may not be used."""
     thermal_correction: ThermalCorrection | None = field(default=None, repr=False)
     """The current correction of the kind "thermal", or None."""
@@ -138,37 +139,47 @@ class Unit:
     """Declaration from the unit's own file; None for a simulated unit."""
 
     def calibration(self, triad: str) -> TriadCalibration | None:
-        """The current calibration of a triad, or None. Raises `NoCalibration` for one that is rejected or expired."""
+        """Return the current calibration of a triad, or None. Raises `NoCalibration` for one that is rejected or
+        expired.
+        """
         for withheld in self.withheld:
-            if withheld.triad == triad:
+            if withheld.subject == triad:
                 raise NoCalibration(f"unit {self.serial}: {withheld.why}")
         return next((c for c in self.calibrations if c.triad == triad), None)
 
     def calibration_id(self, triad: str) -> str | None:
-        """Id of the stored calibration in use of a triad, or None."""
+        """Return the id of the stored calibration in use of a triad, or None."""
         ids = {c.triad: known for c, known in zip(self.calibrations, self.calibration_ids, strict=False)}
         return ids.get(triad)
 
     def calibration_in_words(self, *triads: str) -> str:
-        """The calibrations of triads as a result's basis names them: "calibration 1 (gyro), 2 (accelerometer)"."""
+        """Return the calibrations of triads as a result's basis names them: "calibration 1 (gyro), 2
+        (accelerometer)".
+        """
         named = [f"{known} ({triad})" for triad in triads if (known := self.calibration_id(triad)) is not None]
         return f"calibration {', '.join(named) or 'of the unit'}"
 
     def correction_ids(self, kinds: Iterable[CorrectionKind]) -> tuple[str, ...]:
-        """Ids of the current corrections of some kinds, in their order, without those that the unit does not have."""
+        """Return the ids of the current corrections of some kinds, in their order, without those that the unit does not
+        have.
+        """
         known = (getattr(self, CORRECTION_IDS[kind]) for kind in kinds)
         return tuple(correction for correction in known if correction is not None)
 
     def why_withheld(self, kind: CorrectionKind) -> str:
-        """The reason why the current correction of a kind may not be used; empty where it may, or there is none."""
-        return next((w.why for w in self.withheld if w.triad == kind), "")
+        """Return the reason why the current correction of a kind may not be used; empty where it may, or there is
+        none.
+        """
+        return next((w.why for w in self.withheld if w.subject == kind), "")
 
     def triad(self, triad: str) -> TriadRecord | None:
-        """The record of a triad by name."""
+        """Return the record of a triad by name; None where nothing is known of its noise."""
         return {"gyro": self.gyro, "accelerometer": self.accelerometer}[triad]
 
     def channel_noise(self, channel: Channel) -> NoiseCoefficients | None:
-        """Noise of a triad's channel; None where it is not known, as for a channel in counts: the record is in SI."""
+        """Return the noise of a triad's channel; None where it is not known, as for a channel in counts: the record is
+        in SI.
+        """
         for triad, names in TRIADS.items():
             record = self.triad(triad)
             if channel.name in names and record is not None and channel.rate_unit != "count":
@@ -176,12 +187,14 @@ class Unit:
         return None
 
     def known_matrix(self, triad: str) -> Array | None:
-        """K (3, 3) of the current calibration; None without one that may be used, and for one in counts."""
+        """Return K (3, 3) of the current calibration; None without one that may be used, and for one in counts."""
         calibration = next((c for c in self.calibrations if c.triad == triad), None)
         return None if calibration is None or calibration.output_unit == "count" else calibration.matrix_array
 
     def required_calibration(self, triad: str, purpose: str) -> TriadCalibration:
-        """The current calibration of a triad for a purpose ("verify"). Raises `NoCalibration` with the remedy."""
+        """Return the current calibration of a triad for a purpose ("verify"). Raises `NoCalibration` with the
+        remedy.
+        """
         calibration = self.calibration(triad)
         if calibration is None:
             raise NoCalibration(

@@ -1,4 +1,4 @@
-"""The only place where a conversion factor is written. Multiply to reach SI, divide to leave it."""
+"""Conversion factors, written nowhere else. Multiply by one to reach SI, divide by it to leave SI."""
 
 from math import pi, sqrt
 
@@ -67,7 +67,7 @@ _SIZES: dict[str, dict[str, float]] = {
 
 
 def converted(value: float, unit: str, wanted: str) -> float:
-    """Convert a value to another unit of the same kind. Raises `ValueError` naming the units that would do."""
+    """Return a value converted to another unit of the same kind. Raises `ValueError` naming the units that would do."""
     if unit == wanted:
         return value
     for sizes in _SIZES.values():
@@ -77,5 +77,5 @@ def converted(value: float, unit: str, wanted: str) -> float:
 
 
 def units_like(unit: str) -> tuple[str, ...]:
-    """Units in which a value of this unit can be expressed."""
+    """Return the units in which a value of this unit can be expressed."""
     return next((tuple(sizes) for sizes in _SIZES.values() if unit in sizes), (unit,))

@@ -1,4 +1,6 @@
-"""Arguments as people have them, lists, arrays, pandas objects, brought to arrays or refused in words."""
+"""Conversion of arguments of any common type (lists, arrays, pandas objects) to arrays; what does not fit is refused in
+words.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,7 +18,9 @@ RATE_UNITS = (*units_like("rad/s"), *units_like("m/s^2"))
 
 
 def series(name: str, samples: Samples) -> Array:
-    """One channel's samples, (n,), as floating-point numbers. Raises `BadParameter`; NaN is left to the caller."""
+    """Return one channel's samples, (n,), as floating-point numbers. Raises `BadParameter`; NaN is left to the
+    caller.
+    """
     found = _numbers(name, samples)
     if found.ndim == 2 and 1 in found.shape:
         found = found.ravel()
@@ -28,7 +32,7 @@ def series(name: str, samples: Samples) -> Array:
 
 
 def vectors(name: str, values: Samples) -> Array:
-    """Vectors, (n, 3), finite. Raises `BadParameter`."""
+    """Return vectors, (n, 3), finite. Raises `BadParameter`."""
     found = _numbers(name, values)
     if found.ndim != 2 or found.shape[1] != 3:
         raise BadParameter(name, f"an array of shape {found.shape}", "a row of x, y, z for each pose, shape (n, 3)")
@@ -39,7 +43,7 @@ def vectors(name: str, values: Samples) -> Array:
 
 
 def positive(name: str, value: float) -> float:
-    """A finite number above zero. Raises `BadParameter`."""
+    """Return a finite number above zero. Raises `BadParameter`."""
     try:
         number = float(value)
     except (TypeError, ValueError):
@@ -50,14 +54,14 @@ def positive(name: str, value: float) -> float:
 
 
 def one_of(name: str, value: str, allowed: Sequence[str]) -> str:
-    """A word of a list. Raises `BadParameter` naming the list."""
+    """Return a word that must be one of a list. Raises `BadParameter` naming the list."""
     if value not in allowed:
         raise BadParameter(name, value, f"one of {', '.join(allowed)}")
     return value
 
 
 def si_unit(unit: str) -> tuple[str, float]:
-    """SI unit of a rate or specific force, and the size of `unit` in it. Raises `BadParameter`."""
+    """Return the SI unit of a rate or specific force, and the size of `unit` in it. Raises `BadParameter`."""
     one_of("unit", unit, RATE_UNITS)
     si = "rad/s" if unit in units_like("rad/s") else "m/s^2"
     return si, converted(1.0, unit, si)

@@ -1,4 +1,4 @@
-"""Columns of a text or numpy file: the one place of the package that reads a file, for work at a prompt."""
+"""Columns of a text or numpy file: the one place of the package that reads a file, for use without the service."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Axes for a result's plot; matplotlib is asked for here alone, and its absence is a sentence."""
+"""Axes for a result's plot; only this module imports matplotlib, and says in a sentence where it is missing."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from procedures.core.errors import DomainError
 
 
 def axes(given: Any) -> Any:
-    """The given axes, or new ones of one figure. Raises `DomainError` where matplotlib is not installed."""
+    """Return the given axes, or new ones of one figure. Raises `DomainError` where matplotlib is not installed."""
     if given is not None:
         return given
     try:

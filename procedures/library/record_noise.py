@@ -25,7 +25,7 @@ LETTERS = {
 
 @dataclass(frozen=True)
 class Noise:
-    """The five processes of one channel by maximum likelihood, and everything else that the analysis found."""
+    """The five processes of one channel by maximum likelihood, with the other findings of the analysis."""
 
     channel: ChannelNoise
     """Complete analysis in SI: curves, read-off, least squares, band, averaging time."""

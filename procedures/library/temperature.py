@@ -15,7 +15,7 @@ from procedures.library.figure import axes
 
 @dataclass(frozen=True)
 class Polynomial:
-    """Fitted polynomial, with the soaks that it was fitted to."""
+    """Fitted polynomial of a quantity in temperature, with the soaks that it was fitted to."""
 
     fit: Normalised
     """Value at the reference, coefficients and their covariance."""
@@ -27,7 +27,9 @@ class Polynomial:
         return self.fit.value(series("temperature_c", temperature_c))
 
     def sd(self, temperature_c: Samples) -> Array:
-        """Standard uncertainties of the values at temperatures (n,) [°C], from the covariance of the coefficients."""
+        """Return the standard uncertainties of the values at temperatures (n,) [°C], from the covariance of the
+        coefficients.
+        """
         departure = series("temperature_c", temperature_c) - self.fit.reference_c
         powers = departure[:, None] ** np.arange(1, len(self.fit.coefficients) + 1)
         size = self.fit.at_reference if self.fit.relative else 1.0

@@ -48,7 +48,7 @@ class Calibration:
         return dict(zip(COEFFICIENT_NAMES, self.triad.standard_uncertainties.tolist(), strict=True))
 
     def correct(self, outputs: Samples) -> Array:
-        """``v̂ = K⁻¹(U − b)`` of outputs (n, 3)."""
+        """Return ``v̂ = K⁻¹(U − b)`` of outputs (n, 3), in the unit of the inputs. Raises `BadParameter`."""
         return correct(vectors("outputs", outputs), self.triad)
 
     def __str__(self) -> str:

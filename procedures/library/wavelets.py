@@ -1,4 +1,4 @@
-"""Wavelet split of a record at rest into what is slow and what is noise of the short times."""
+"""Wavelet split of a record at rest into its slow part and the noise of short times."""
 
 from dataclasses import dataclass
 from typing import Any

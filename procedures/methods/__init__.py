@@ -7,10 +7,12 @@ from procedures.procedure import Method
 
 
 def find(only: str | None = None) -> Discovered[Method[Any, Any]]:
-    """Every METHOD of this folder by name, or one alone, and the files that give none, with the reason."""
+    """Return every METHOD of this folder by name, or the one named `only`, and the files that give none, with the
+    reason.
+    """
     return discovered(__name__, __path__, "METHOD", Method, only)
 
 
 def discover() -> dict[str, Method[Any, Any]]:
-    """All methods of this folder by name, which is the file's. Raises the error of the first broken file."""
+    """Return all methods of this folder by name, which is the file's. Raises the error of the first broken file."""
     return find().complete()

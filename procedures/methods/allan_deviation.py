@@ -81,7 +81,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Analyse block by block, in constant memory. Raises `MissingChannel`, `UnfitRecording`."""
+    """Return the deviations of every recording and channel, computed block by block in constant memory. Raises
+    `MissingChannel`, `UnfitRecording`.
+    """
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to take a deviation of")
     statistic = STATISTICS[params.statistic]
@@ -103,7 +105,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Report with a plot for each curve and its density, and a table with three of its points."""
+    """Return the report with a plot for each curve and its density, and a table with three of its points."""
     return deviation_report(result.statistic, result.confidence, result.curves)
 
 
@@ -199,7 +201,7 @@ def _naming(recording: str, channel: str = "") -> Generator[None]:
 def beside(
     recordings: Sequence[Recording], curves: tuple[Curve, ...], params: Params
 ) -> tuple[tuple[Curve, ...], tuple[str, ...]]:
-    """The curves with densities and bands, and sentences on what could not be found."""
+    """Return the curves with densities and bands, and sentences on what could not be found."""
     told: list[str] = []
     found: list[Curve] = []
     for recording in recordings:
@@ -219,7 +221,7 @@ def beside(
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Requested channels of each recording by itself."""
+    """Return the settings of the inspection: the requested channels of each recording by itself."""
     gaps = "refuse" if params.gaps == "refuse" else "aware"
     return Inspection(FitnessSettings(least_samples=1, gaps=gaps), params.channels)
 

@@ -64,7 +64,7 @@ class Params(Parameters):
 
     @property
     def fitted_range(self) -> TemperatureRange | None:
-        """The range of both sensors, where it is known."""
+        """Temperature range of both sensors; None where it is not known."""
         if self.case_range_c is None or self.converter_range_c is None:
             return None
         return TemperatureRange(self.case_range_c, self.converter_range_c)
@@ -78,7 +78,7 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Convert to degrees and keep. Raises `BadParameter`."""
+    """Return the correction converted to degrees. Raises `BadParameter`."""
     axes = (_axis(params, 0), _axis(params, 1), _axis(params, 2))
     found = ThermalCorrection("accelerometer", axes, fitted_range=params.fitted_range)
     given = float(sum(np.count_nonzero([*a.alpha, *a.beta]) for a in params.axes))
@@ -88,7 +88,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Coefficients a degree, with their uncertainties and their origin."""
+    """Return the report: coefficients a degree, with their uncertainties and their origin."""
     rows = tuple(
         (axis, name, value, sd)
         for axis, one in zip("xyz", result.correction.axes, strict=True)
@@ -101,7 +101,7 @@ def report(result: Result) -> Report:
 
 
 def corrections(result: Result) -> tuple[UnitCorrection, ...]:
-    """The correction for the unit's history."""
+    """Return the correction for the unit's history."""
     return (UnitCorrection("thermal", result.correction),)
 
 

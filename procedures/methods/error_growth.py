@@ -104,7 +104,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Errors of the one calibration given, else of the unit's current one, else the declared ones."""
+    """Return the errors' growth for the one calibration given, else the unit's current one, else the declared errors.
+    Raises `BadParameter`.
+    """
     place = Place(params.latitude_deg * units.DEG, params.gravity_m_s2, units.EARTH_RATE, vertical=params.vertical)
     attitude = rotation_nb(*(np.array([params.heading_deg, params.pitch_deg, params.roll_deg]) * units.DEG))
     gyro, accelerometer, basis = _errors(evidence, params, unit, place, attitude)
@@ -146,7 +148,9 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """The sentence, the sources, and a plot each of position, velocity and attitude with 95 % intervals."""
+    """Return the report: the sentence, the sources, and a plot each of position, velocity and attitude with 95 %
+    intervals.
+    """
     rows = tuple((s.source, s.after_1h_m, s.at_end_m) for s in result.shares)
     end = f"after {result.time_s[-1] / units.HOUR:g} h, m"
     table = Table("95 % radius of the position by source", ("source", "after 1 h, m", end), rows, result.basis)

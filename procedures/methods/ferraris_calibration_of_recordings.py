@@ -35,7 +35,9 @@ class Params(RecordedParameters):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Least squares over rests and turns of both triads. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    """Return the coefficients of both triads by least squares over rests and turns. Raises `UnfitRecording`,
+    `MissingChannel`, `Undetermined`.
+    """
     site = Site(
         params.latitude_deg, params.gravity_m_s2, params.azimuth_deg, params.azimuth_sd_arcsec, params.gravity_sd_m_s2
     )

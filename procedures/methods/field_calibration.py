@@ -95,7 +95,8 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Calibrate from one recording a position. Raises `Undetermined` where the positions are not sufficient.
+    """Return the calibration from one recording a position. Raises `Undetermined` where the positions are not
+    sufficient.
 
     Also `UnfitRecording` and `BadParameter` where positions are missing or too few.
     """
@@ -122,12 +123,12 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """Calibration with diagonal K, model "field"."""
+    """Return the calibrations with diagonal K, model "field"."""
     return tuple(t.calibration for t in result.triads)
 
 
 def report(result: Result) -> Report:
-    """Bias and scale of every channel, and the tilt."""
+    """Return the report: bias and scale of every channel, and the tilt."""
     rows = tuple(
         (
             f"{t.calibration.triad} {axis}",
@@ -268,7 +269,7 @@ def _warnings(triads: Sequence[FieldTriad], accelerometer: FieldFit, params: Par
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Positions at rest, of the triads that are calibrated."""
+    """Return the settings of the inspection: positions at rest, of the triads that are calibrated."""
     return replace(STATIONS, channels=ACCELEROMETER if params.gyro == "none" else GYRO + ACCELEROMETER)
 
 

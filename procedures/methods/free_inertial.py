@@ -84,7 +84,8 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Align, navigate and judge one recording, with the calibrations given, else the unit's current ones.
+    """Align, navigate and judge one recording, with the calibrations given, else the unit's current ones; return the
+    drift.
 
     Raises `BadParameter` for a part that the recording does not have, `UnfitRecording` where it is not at rest.
     """
@@ -211,7 +212,7 @@ def _sentence(track: Track, radius_m: float, distance: float, p_value: float, kn
 
 
 def report(result: Result) -> Report:
-    """Drift beside the predicted radius, the track, and the velocities."""
+    """Return the report: drift with the predicted radius, the track, and the velocities."""
     hours = tuple(t / units.HOUR for t in result.time_s)
     a = result.attitude
     rows = (

@@ -76,7 +76,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Analyse one recording a heading, in order. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
+    """Return the results of three gyros from one recording a heading, in order. Raises `UnfitRecording`,
+    `MissingChannel`, `BadParameter`.
+    """
     means = station_means(evidence.recordings, "gyro")
     if means.output_unit != "rad/s":
         raise UnfitRecording(f"the gyro channels are in {means.output_unit}: give their scale, to rad/s")
@@ -101,7 +103,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Report with a row a channel, and the rate."""
+    """Return the report with a row a channel, and the rate."""
     unit, size = units.DISPLAY["rad/s"]
     columns = ("gyro", "unit", "half difference", "±", "± by noise within", "half sum", "±")
     rows = tuple(
@@ -170,7 +172,7 @@ def _warnings(found: HalfTurns, level: list[int]) -> tuple[str, ...]:
 
 
 def inspection(_params: Params, _count: int) -> Inspection:
-    """Inspection of headings at rest against each other, the gyros alone."""
+    """Return the settings of the inspection: headings at rest against each other, the gyros alone."""
     return replace(STATIONS, channels=GYRO)
 
 

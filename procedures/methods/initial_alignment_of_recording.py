@@ -88,7 +88,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Correct the means with the calibration given, else the unit's current one. Raises `BadParameter` at a pole."""
+    """Return the attitude of each recording from its means, corrected with the calibration given, else the unit's
+    current one. Raises `BadParameter` at a pole, `UnfitRecording`.
+    """
     require_alignable(params.latitude_deg)
     if not evidence.recordings:
         raise UnfitRecording("there is no recording of a resting unit to align")
@@ -107,7 +109,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Report with a row a recording."""
+    """Return the report with a row a recording."""
     columns = ("recording", "heading, deg", "±", "pitch, deg", "±", "roll, deg", "±", "time, s", "thesis 1.1, deg")
     rows = tuple(
         (

@@ -51,7 +51,7 @@ class Params(RecordedParameters):
     )
 
     def level_of_each(self, channels: int) -> float:
-        """Level of one test, by Bonferroni; `channels` counts those of all recordings."""
+        """Return the level of one test, by Bonferroni; `channels` counts those of all recordings."""
         return self.level / (2 * max(1, channels))
 
 
@@ -95,7 +95,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Estimate each recording alone: each orientation has its constant. Raises `MissingChannel`, `UnfitRecording`."""
+    """Return the biases of each recording alone: each orientation has its constant. Raises `MissingChannel`,
+    `UnfitRecording`.
+    """
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to estimate a bias from")
     biases = tuple(b for r in evidence.recordings for b in _of_recording(r, params, unit))
@@ -107,7 +109,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Report with a row a channel, and the convergence of each estimate."""
+    """Return the report with a row a channel, and the convergence of each estimate."""
     columns = ("channel", "recording", "unit", "bias", "±", "± if white", "enough after, s", "dwell needed, s")
     rows = tuple(
         (
@@ -252,7 +254,7 @@ def _warnings(biases: Sequence[ChannelBias]) -> list[str]:
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Requested channels of each recording by itself."""
+    """Return the settings of the inspection: the requested channels of each recording by itself."""
     return Inspection(FitnessSettings(least_samples=1, counters_may_rest=True), params.channels or GYRO + ACCELEROMETER)
 
 

@@ -33,7 +33,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Compare the calibrations of a unit by mounting, triad by triad; at least two mountings are needed."""
+    """Return the scatter of cross-couplings between mountings, triad by triad. Raises `BadParameter` for fewer than two
+    mountings.
+    """
     bare = [c.id for c in evidence.calibrations if not c.mounting]
     if bare:
         raise BadParameter("calibrations", ", ".join(bare), "calibrations by jobs that rest on a mounting")
@@ -76,7 +78,7 @@ def _of(evidence: Evidence, mounting: str, triad: str) -> list[TriadCalibration]
 
 
 def report(result: Result) -> Report:
-    """Checks, scatter between and within mountings, and each cross-coupling over the mountings."""
+    """Return the report: checks, scatter between and within mountings, and each cross-coupling over the mountings."""
     size = units.ARCSEC
     rows = tuple(
         (

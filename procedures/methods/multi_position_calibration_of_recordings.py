@@ -62,7 +62,9 @@ class Params(FitParameters, RecordedParameters):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Least squares over the means of the recordings. Raises `BadParameter`, `UnfitRecording`, `Undetermined`."""
+    """Return the calibration by least squares over the means of the recordings. Raises `BadParameter`,
+    `UnfitRecording`, `Undetermined`.
+    """
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to calibrate from")
     if params.directions is not None:
@@ -86,7 +88,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def uses_corrections(result: Result) -> tuple[CorrectionKind, ...]:
-    """Kinds of the unit's current corrections that brought the triads of the result to their references."""
+    """Return the kinds of the unit's current corrections that brought the triads of the result to their references."""
     if result.thermal is None:
         return ()
     return ("thermal", "gyros") if any(t.calibration.triad == "gyro" for t in result.triads) else ("thermal",)

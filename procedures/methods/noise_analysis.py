@@ -19,12 +19,14 @@ class Result(NoiseResult):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Analyse the recordings as launches. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
+    """Return the noise of the recordings, each taken as a launch. Raises `UnfitRecording`, `MissingChannel`,
+    `BadParameter`.
+    """
     return analyse_launches(Result, evidence.recordings, params, unit)
 
 
 def report(result: Result) -> Report:
-    """Tables and plots of every channel."""
+    """Return the report: tables and plots of the noise of every channel."""
     return noise_report(result.launches, result.channels, result.averaging_time_s, result.drawn_launch)
 
 

@@ -114,8 +114,8 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Search, score and compare. Raises `BadParameter` without a unit of known noise, `Undetermined` for a reference
-    that does not show all coefficients.
+    """Search, score and compare plans, and return them with the recommended one. Raises `BadParameter` without a unit
+    of known noise, `Undetermined` for a reference that does not show all coefficients.
     """
     if unit is None:
         raise BadParameter("recordings", 0, "give a recording or a calibration of the unit to plan for")
@@ -151,7 +151,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Report comparing the plans, then the recommended orientations."""
+    """Return the report comparing the plans, then the recommended orientations."""
     rows = tuple(
         (p.name, len(p.orientations_deg), p.dwell_s, t.triad, t.worst, t.improvement, t.bound)
         for p in result.plans

@@ -33,7 +33,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Compare all calibrations given, triad by triad; at least two of a triad are needed."""
+    """Return the scatter of all calibrations given, triad by triad. Raises `BadParameter` for fewer than two of a
+    triad.
+    """
     found: list[Scatter] = []
     for triad in TRIADS:
         of_triad = [c for dated in evidence.calibrations for c in dated.triads if c.triad == triad]
@@ -60,7 +62,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Checks, scatter, and every coefficient over the calibrations."""
+    """Return the report: checks, scatter, and every coefficient over the calibrations."""
     rows = tuple(
         (
             s.triad,
@@ -120,7 +122,7 @@ def _check(s: Scatter, limit: Limit) -> Check:
 
 
 def planned_checks(params: Params, unit: Unit, planned: Planned) -> tuple[PlannedCheck, ...]:
-    """Checks of the scatter over calibrations that are planned, by their predicted uncertainties.
+    """Return the planned checks of the scatter over calibrations that are planned, by their predicted uncertainties.
 
     Of a scale factor the nominal one is taken for 1, as in the preview of a unit that has no calibration.
     """
@@ -144,7 +146,7 @@ def planned_checks(params: Params, unit: Unit, planned: Planned) -> tuple[Planne
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """No calibrations to store: they are the input of this method."""
+    """Return no calibrations: they are the input of this method."""
     return ()
 
 

@@ -122,7 +122,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Several recordings are one pose each; a single one is searched for still stretches."""
+    """Return the nine parameters of a triad; several recordings are one pose each, a single one is searched for still
+    stretches. Raises `UnfitRecording`, `Undetermined`, `MissingChannel`.
+    """
     recordings = evidence.recordings
     poses = (
         _poses_of_one(recordings[0], params, unit)
@@ -141,12 +143,12 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """The nine as ``U = b + K·v``, K upper triangular."""
+    """Return the nine parameters as a calibration ``U = b + K·v``, K upper triangular."""
     return (result.calibration,)
 
 
 def report(result: Result) -> Report:
-    """Parameters, checks, and the magnitude's residual of every pose."""
+    """Return the report: parameters, checks, and the magnitude's residual of every pose."""
     rows = tuple((p.name, p.unit, p.estimate, p.standard_uncertainty) for p in result.parameters)
     columns = ("parameter", "unit", "estimate", "± standard uncertainty")
     table = Table("Scalar calibration", columns, rows, "v̂ = T·S·(U − b), T upper triangular with a unit diagonal.")
@@ -258,7 +260,9 @@ def _warnings(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[str, ...]
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Inspection of the triad: poses at rest against each other, or one recording of a unit turned by hand."""
+    """Return the settings of the inspection: poses at rest against each other, or one recording of a unit turned by
+    hand.
+    """
     return replace(STATIONS, channels=TRIADS[params.triad]) if count > 1 else Inspection(TURNED, TRIADS[params.triad])
 
 

@@ -106,7 +106,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Fit every channel over all recordings. Raises `BadParameter`, `MissingChannel`, `UnfitRecording`."""
+    """Return the dependence of every channel, fitted over all recordings. Raises `BadParameter`, `MissingChannel`,
+    `UnfitRecording`.
+    """
     recordings = evidence.recordings
     if not recordings:
         raise UnfitRecording("there is no recording to analyse")
@@ -262,7 +264,7 @@ def _warnings(found: Sequence[ChannelFound], unit: Unit | None, params: Params) 
 
 
 def corrections(result: Result) -> tuple[UnitCorrection, ...]:
-    """The correction of the gyros, where one of them depends."""
+    """Return the correction of the gyros, where one of them depends on temperature; otherwise nothing."""
     gyros = result.gyro_correction
     if gyros is None or not any(g.coefficients for g in gyros.gyros):
         return ()
@@ -270,7 +272,7 @@ def corrections(result: Result) -> tuple[UnitCorrection, ...]:
 
 
 def report(result: Result) -> Report:
-    """Coefficients and orders, soaks, repeatability, and the temperature itself."""
+    """Return the report: coefficients and orders, soaks, repeatability, and the temperature itself."""
     return dependence_report(result.channels, result.reference_c, result.trace_c)
 
 

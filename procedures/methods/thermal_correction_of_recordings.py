@@ -99,9 +99,8 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Fit thesis 4.1 to all recordings at once.
-
-    Raises `BadParameter`, `MissingChannel`, `UnfitRecording`, and `Undetermined` with the combinations that are lost.
+    """Return thesis 4.1 fitted to all recordings at once. Raises `BadParameter`, `MissingChannel`, `UnfitRecording`,
+    and `Undetermined` with the combinations that are lost.
     """
     recordings = evidence.recordings
     if not recordings:
@@ -138,12 +137,12 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def corrections(result: Result) -> tuple[UnitCorrection, ...]:
-    """The correction for the unit's history."""
+    """Return the correction of the accelerometers for the unit's history."""
     return (UnitCorrection("thermal", result.correction),)
 
 
 def uses_corrections(result: Result) -> tuple[CorrectionKind, ...]:
-    """Kinds of the unit's current corrections that were taken out first."""
+    """Return the kinds of the unit's current corrections that were taken out first."""
     kinds: tuple[tuple[CorrectionKind, bool], ...] = (
         ("thermometers", result.correction.thermometers is not None),
         ("converter", result.correction.first_stage is not None),
@@ -152,7 +151,9 @@ def uses_corrections(result: Result) -> tuple[CorrectionKind, ...]:
 
 
 def report(result: Result) -> Report:
-    """Coefficients with their uncertainties, and the fit of each axis with the reasons for its order."""
+    """Return the report: coefficients with their uncertainties, and the fit of each axis with the reasons for its
+    order.
+    """
     rows = tuple(
         (one.axis, name, unit, value, sd)
         for one, axis in zip(result.axes, result.correction.axes, strict=True)

@@ -1,4 +1,4 @@
-"""Plots and table of Allan deviations, each with the power spectral density with it."""
+"""Plots and table of Allan deviations, each with its power spectral density."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from procedures.core.report import Figure, Report, Series, Table
 
 
 def deviation_report(statistic: str, confidence: float, curves: Sequence[Curve]) -> Report:
-    """Report with a plot for each curve and its density, and a table with three of its points."""
+    """Return the report with a plot for each curve and its density, and a table with three of its points."""
     name = statistic.replace("_", " ")
     figures = tuple(
         figure for curve in curves for figure in (_figure(curve, name, confidence), *_density_figure(curve))

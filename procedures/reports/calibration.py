@@ -1,6 +1,4 @@
-"""Tables and figures of calibrations and verifications: the thesis's figures 5.6-5.12 and Tables 5.1-5.4 in our
-words.
-"""
+"""Tables and figures of calibrations and verifications: the thesis's figures 5.6-5.12 and Tables 5.1-5.4, reworded."""
 
 from collections.abc import Sequence
 
@@ -17,13 +15,15 @@ SYMBOL = {"gyro": "|ω|", "accelerometer": "|g|"}
 
 
 def triad_table(summary: TriadSummary) -> Table:
-    """Coefficients of a triad from stations at rest."""
+    """Return the table of a triad's coefficients from stations at rest."""
     note = f"U = b + K·v. Condition of the design {summary.condition:.3g}. Weighted by {WEIGHTS[summary.weighting]}."
     return coefficient_table(f"Coefficients of the {summary.calibration.triad} triad", summary.coefficients, note)
 
 
 def coefficient_table(title: str, coefficients: Sequence[Coefficient], note: str) -> Table:
-    """Estimate ± standard uncertainty in the units people read; scale factors as departures from one [ppm]."""
+    """Return the table of estimates ± standard uncertainty in the units people read; scale factors as departures from
+    one [ppm].
+    """
     sources = tuple(coefficients[0].from_table_source)
     columns = ("coefficient", "unit", "estimate", "± standard uncertainty", "of noise", "of table", *sources)
     return Table(title, columns, tuple(_coefficient_row(c, sources) for c in coefficients), note)
@@ -38,7 +38,9 @@ def _coefficient_row(c: Coefficient, sources: Sequence[str]) -> tuple[str | floa
 
 
 def budget_table(triad: str, budgets: Sequence[Budget]) -> Table:
-    """Uncertainty budget of each coefficient, source by source, with the expanded uncertainty below the rows."""
+    """Return the uncertainty budget of each coefficient, source by source, with the expanded uncertainty below the
+    rows.
+    """
     rows: list[tuple[str | float, ...]] = []
     for budget in budgets:
         unit, size = ("ppm", units.PPM) if budget.unit == "1" else units.DISPLAY.get(budget.unit, (budget.unit, 1.0))
@@ -59,17 +61,19 @@ def budget_table(triad: str, budgets: Sequence[Budget]) -> Table:
 
 
 def budget_tables(triad: str, budgets: Sequence[Budget]) -> tuple[Table, ...]:
-    """The table of `budget_table`, or none of a result without budgets."""
+    """Return the table of `budget_table`; nothing for a result without budgets."""
     return (budget_table(triad, budgets),) if budgets else ()
 
 
 def triad_figures(t: TriadSummary) -> tuple[Figure, ...]:
-    """Figures of a triad: its magnitudes, then its residuals."""
+    """Return the figures of a triad: its magnitudes, then its residuals."""
     return (*magnitude_figures(t.magnitudes), residual_figure(t))
 
 
 def residual_figure(summary: TriadSummary) -> Figure:
-    """Residuals of the three channels per orientation, error bars one expected standard deviation."""
+    """Return the figure of the residuals of the three channels per orientation, error bars one expected standard
+    deviation.
+    """
     c = summary.calibration
     unit, size = units.DISPLAY[c.output_unit]
     series = tuple(
@@ -91,7 +95,9 @@ def residual_figure(summary: TriadSummary) -> Figure:
 
 
 def magnitude_figures(m: Magnitudes) -> tuple[Figure, ...]:
-    """|v̂| before and after with the reference (figures 5.6, 5.10), after alone (5.7, 5.11), errors (5.8, 5.12)."""
+    """Return the figures of |v̂| before and after with the reference (5.6, 5.10), after alone (5.7, 5.11), errors (5.8,
+    5.12).
+    """
     unit, size = units.DISPLAY[m.unit]
     x, symbol = _stations(m), SYMBOL[m.triad]
     reference = Series("reference", x, (m.reference / size,) * len(x), style="reference")
@@ -116,7 +122,9 @@ def magnitude_figures(m: Magnitudes) -> tuple[Figure, ...]:
 
 
 def sample_table(triads: Sequence[TriadSummary]) -> Table:
-    """Magnitudes in sample, as the thesis's Tables 5.3 and 5.4 print them, beside those out of sample."""
+    """Return the table of magnitudes in sample, as the thesis's Tables 5.3 and 5.4 print them, with those out of
+    sample.
+    """
     named = [(m, f"{m.triad}, {kind}") for t in triads for kind, m in _samples(t)]
     note = (
         "In sample: corrected with the coefficients that these very stations gave, as in thesis tables 5.3 and 5.4; "
@@ -133,7 +141,9 @@ def _samples(t: TriadSummary) -> tuple[tuple[str, Magnitudes], ...]:
 
 
 def magnitude_table(all_magnitudes: Sequence[Magnitudes], title: str) -> Table:
-    """Mean error and standard deviation before and after (as in Tables 5.3, 5.4) and δ/√3 (thesis 5.1)."""
+    """Return the table of mean error and standard deviation before and after (as in Tables 5.3, 5.4) and δ/√3 (thesis
+    5.1).
+    """
     rows: list[tuple[str | float | None, ...]] = []
     for m in all_magnitudes:
         unit, size = units.DISPLAY[m.unit]
@@ -154,7 +164,9 @@ def magnitude_table(all_magnitudes: Sequence[Magnitudes], title: str) -> Table:
 
 
 def station_table(m: Magnitudes) -> Table:
-    """Table of the magnitude at every orientation, before and after correction, with its error and expected spread."""
+    """Return the table of the magnitude at every orientation, before and after correction, with its error and expected
+    spread.
+    """
     unit, size = units.DISPLAY[m.unit]
     before = m.before or (None,) * len(m.after)
     expected = m.expected_sd or (None,) * len(m.after)
@@ -167,7 +179,9 @@ def station_table(m: Magnitudes) -> Table:
 
 
 def scalar_table(summary: TriadSummary) -> Table | None:
-    """Compare the nine parameters from magnitudes alone with those of the linear fit."""
+    """Return the table of the nine parameters from magnitudes alone against those of the linear fit; None without
+    them.
+    """
     if summary.scalar is None:
         return None
     rows = tuple(
@@ -180,7 +194,9 @@ def scalar_table(summary: TriadSummary) -> Table | None:
 
 
 def thermal_tables(share: ThermalShare, labels: Sequence[str]) -> list[Table]:
-    """Tables of the thermal correction of the accelerometers' station means, and of its remaining uncertainty."""
+    """Return the tables of the thermal correction of the accelerometers' station means, and of its remaining
+    uncertainty.
+    """
     rows = zip(labels, share.case_c, share.converter_c, share.change_m_s2, strict=True)
     regime = f", regime taken as {share.regime}" if share.regime else ""
     parts = tuple((name, share.from_correction[name], share.from_sensors[name]) for name in COEFFICIENT_NAMES)

@@ -21,7 +21,9 @@ over a period: ``2Δt·|1 − e^{−i2πfΔt}|²/Δt²``, at low frequencies ``2
 
 
 def density_figure(channels: Sequence[ChannelNoise], labels: Sequence[str]) -> Figure | None:
-    """Density of the first launch with its interval and model, with the other launches; None in results without it."""
+    """Return the figure of the first launch's density with interval and model, with the other launches; None in results
+    without it.
+    """
     first = channels[0]
     found = [(c.density, label) for c, label in zip(channels, labels, strict=True) if c.density is not None]
     if first.density is None or not found:

@@ -18,7 +18,7 @@ COLUMNS = (
 
 
 def diagnosis_tables(diagnoses: Sequence[TriadDiagnosis]) -> tuple[Table, ...]:
-    """One table a triad, the largest change first."""
+    """Return one table a triad of changed coefficients, the largest change first."""
     return tuple(_table(d) for d in diagnoses)
 
 

@@ -11,7 +11,7 @@ INTERVAL = 1.959964
 
 
 def figures(time_s: Sequence[float], curves: Sequence[Curve]) -> tuple[Figure, ...]:
-    """Position, velocity and attitude over time, half-lengths of the 95 % intervals."""
+    """Return the figures of position, velocity and attitude errors over time, half-lengths of the 95 % intervals."""
     hours = tuple(t / units.HOUR for t in time_s)
     kinds = (("Position", "m", "m", 1.0), ("Velocity", "m/s", "m/s", 1.0), ("Attitude", "rad", "arcsec", units.ARCSEC))
     return tuple(

@@ -26,7 +26,7 @@ def noise_report(
     averaging_time_s: float | None,
     drawn_launch: int = 1,
 ) -> Report:
-    """Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel."""
+    """Return the report: Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel."""
     doubts = disagreements(launches)
     tables = [
         side_by_side(channels, launches),
@@ -53,7 +53,7 @@ def _summary(launches: Sequence[LaunchNoise], averaging_time_s: float | None) ->
 
 
 def side_by_side(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:
-    """Compare the launches, by the likelihood fit (Tables 4.1 and 4.2)."""
+    """Return the table that compares the launches, by the likelihood fit (Tables 4.1 and 4.2)."""
     rows = [
         (
             s.channel,
@@ -87,7 +87,7 @@ def side_by_side(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchN
 
 
 def three_ways(launch: LaunchNoise) -> Table:
-    """Every coefficient of one launch by all three ways."""
+    """Return the table of every coefficient of one launch by all three ways: graphical, least squares, likelihood."""
     rows = [
         (channel.channel, TITLES[c.process], unit, *_ways(c, size))
         for channel in launch.channels
@@ -106,7 +106,7 @@ def three_ways(launch: LaunchNoise) -> Table:
 
 
 def disagreements(launches: Sequence[LaunchNoise]) -> Table | None:
-    """Contradictions among the three ways, and effects outside the model."""
+    """Return the table of contradictions among the three ways, and of effects outside the model; None without any."""
     rows = [
         (launch.label, channel.channel, sentence)
         for launch in launches
@@ -119,7 +119,9 @@ def disagreements(launches: Sequence[LaunchNoise]) -> Table | None:
 
 
 def steps_table(launches: Sequence[LaunchNoise]) -> Table:
-    """Effect of trimming, removal of self-heating and the wavelet split: graphical readings step by step."""
+    """Return the table of the effect of trimming, removal of self-heating and the wavelet split: graphical readings
+    step by step.
+    """
     rows: list[tuple[Cell, ...]] = []
     for launch in launches:
         for channel in launch.channels:
@@ -134,7 +136,9 @@ def steps_table(launches: Sequence[LaunchNoise]) -> Table:
 
 
 def averaging_table(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:
-    """Averaging times at which quantization falls below the rest of the noise, channel by channel."""
+    """Return the table of averaging times at which quantization falls below the rest of the noise, channel by
+    channel.
+    """
     rows = tuple(
         (s.channel, *(_of(c.averaging.time_s, 1.0) for c in _channel_of(s.channel, launches)), s.averaging_time_s)
         for s in summaries
@@ -146,7 +150,7 @@ def averaging_table(summaries: Sequence[ChannelSummary], launches: Sequence[Laun
 
 
 def launch_means_table(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:
-    """Mean rate of each launch, and how much it changes from one to the next."""
+    """Return the table of the mean rate of each launch, and how much it changes from one to the next."""
     rows = [
         (s.channel, unit, *(c.mean / size for c in _channel_of(s.channel, launches)), _of(s.mean_change_sd, size))
         for s in summaries
@@ -158,7 +162,7 @@ def launch_means_table(summaries: Sequence[ChannelSummary], launches: Sequence[L
 
 
 def channel_figures(name: str, launches: Sequence[LaunchNoise]) -> tuple[Figure, ...]:
-    """Figures of one channel: the Allan plot, its parts, and the signal before removal of trends."""
+    """Return the figures of one channel: the Allan plot, its parts, and the signal before removal of trends."""
     channels = _channel_of(name, launches)
     first = channels[0]
     labels = [launch.label for launch in launches]
@@ -176,7 +180,9 @@ def channel_figures(name: str, launches: Sequence[LaunchNoise]) -> tuple[Figure,
 
 
 def allan_figure(channels: Sequence[ChannelNoise], labels: Sequence[str]) -> Figure:
-    """Deviation with intervals and band of the first launch, its slope lines and readings, with the other launches."""
+    """Return the figure of the deviation with intervals and band of the first launch, its slope lines and readings,
+    with the other launches.
+    """
     first = channels[0]
     unit, size = DEVIATION_DISPLAY[first.rate_unit]
     curve, band = first.analysed.curve, first.band
@@ -196,7 +202,7 @@ def allan_figure(channels: Sequence[ChannelNoise], labels: Sequence[str]) -> Fig
 
 
 def trend_figure(channel: ChannelNoise, label: str) -> Figure:
-    """Moving means since the launch, and the transient or self-heating fitted to them."""
+    """Return the figure of moving means since the launch, and the transient or self-heating fitted to them."""
     unit, size = DEVIATION_DISPLAY[channel.rate_unit]
     t = tuple(v / HOUR for v in channel.trend.t_s)
     series = [Series("moving mean", t, _in([v - channel.mean for v in channel.trend.rate], size), style="line")]

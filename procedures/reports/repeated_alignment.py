@@ -9,7 +9,7 @@ from procedures.core.report import Figure, Series, Table
 
 
 def errors_table(angles: Sequence[AngleErrors]) -> Table:
-    """Table of found and predicted errors, a row an angle [deg]."""
+    """Return the table of found and predicted errors, a row an angle [deg]."""
     columns = ("angle", "mean error", "± expected", "spread", "expected", "one alignment, expected", "χ²", "p")
     rows = tuple(
         (
@@ -22,14 +22,14 @@ def errors_table(angles: Sequence[AngleErrors]) -> Table:
 
 
 def sources_table(angles: Sequence[AngleErrors]) -> Table:
-    """Contributions to the expected standard uncertainty of one alignment [deg]."""
+    """Return the table of contributions to the expected standard uncertainty of one alignment [deg]."""
     sources = (CALIBRATION, LAUNCH, NOISE, TABLE)
     rows = tuple((a.angle, *(a.expected_by_source_deg[s] for s in sources)) for a in angles)
     return Table("Expected of one alignment, by source [deg]", ("angle", *sources), rows)
 
 
 def alignments_table(alignments: Sequence[Alignment]) -> Table:
-    """Table of alignments, one a row [deg]."""
+    """Return the table of alignments, one a row [deg]."""
     rows = tuple(
         (a.label, a.launch, *a.attitude_deg, *a.error_deg, *a.expected_sd_deg, a.duration_s) for a in alignments
     )
@@ -39,7 +39,7 @@ def alignments_table(alignments: Sequence[Alignment]) -> Table:
 
 
 def heading_figure(alignments: Sequence[Alignment]) -> Figure:
-    """Error of the heading, alignment by alignment."""
+    """Return the figure of the heading's error, alignment by alignment [deg]."""
     numbers = tuple(float(i) for i in range(1, len(alignments) + 1))
     errors = tuple(a.error_deg[0] for a in alignments)
     series = Series("heading", numbers, errors, tuple(a.expected_sd_deg[0] for a in alignments))
@@ -48,7 +48,7 @@ def heading_figure(alignments: Sequence[Alignment]) -> Figure:
 
 
 def sentence(heading: AngleErrors, thesis: ThesisPrediction | None) -> str:
-    """Sentence on the expected error of the heading, and the prediction of thesis 1.1."""
+    """Return the sentence on the expected error of the heading, and on the prediction of thesis 1.1."""
     text = f"One alignment's heading is expected with a standard uncertainty of {heading.expected_sd_deg:.3g} deg"
     if thesis is None:
         return text + "."

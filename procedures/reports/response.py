@@ -5,7 +5,7 @@ from procedures.core.report import Figure, Report, Series, Table
 
 
 def response_report(found: DynamicResponse) -> Report:
-    """Delays and bandwidths, then gain and phase of each channel over the frequency."""
+    """Return the report: delays and bandwidths, then gain and phase of each channel over the frequency."""
     figures = [f for c in found.channels for f in (_gains(c), _phases(c))]
     return Report(" ".join(map(_sentence, found.channels)), (_delays(found), *figures, _points(found)))
 

@@ -11,7 +11,7 @@ MOST_LINES = 12
 
 
 def surroundings_tables(launches: Sequence[LaunchNoise]) -> tuple[Table, ...]:
-    """Those of the tables that have rows."""
+    """Return the tables of readiness, temperatures, vibration and lines that have rows."""
     made = (_readiness(launches), _temperatures(launches), _vibration(launches), _lines(launches))
     return tuple(table for table in made if table.rows)
 

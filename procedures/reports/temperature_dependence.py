@@ -8,7 +8,7 @@ from procedures.core.report import Cell, Figure, Report, Series, Table
 
 
 class Dependence(Protocol):
-    """Dependence of one channel, as a result has it."""
+    """Dependence of one channel on temperature, as a result has it. Interface."""
 
     @property
     def channel(self) -> str: ...
@@ -39,7 +39,7 @@ class Dependence(Protocol):
 
 
 def dependence_report(found: Sequence[Dependence], reference_c: float, trace_c: Sequence[Sequence[float]]) -> Report:
-    """Coefficients and orders, soaks, repeatability, and the temperature of each recording."""
+    """Return the report: coefficients and orders, soaks, repeatability, and the temperature of each recording."""
     tables = [_fits(found), _coefficients(found, reference_c)]
     if any(c.soaks for c in found):
         tables += [_soaks(found), _repeated(found)]

@@ -12,14 +12,16 @@ DYNAMIC = "dynamic regime"
 
 
 def figures(cycle: ThermalCycle) -> tuple[Figure, ...]:
-    """Temperatures, indicator, outputs, |ĝ| of each run; Allan deviations of each axis; the last soaks side by side."""
+    """Return all figures: temperatures, indicator, outputs, |ĝ| of each run; Allan deviations of each axis; the last
+    soaks side by side.
+    """
     of_runs = [f for run in cycle.runs for f in (temperatures(run), indicator(run), *outputs(run), magnitudes(run))]
     of_axes = [allan([curve for curve in cycle.allan if curve.axis == axis], axis) for axis in AXES]
     return (*of_runs, *of_axes, soak_figure(cycle))
 
 
 def temperatures(run: RunFound) -> Figure:
-    """Chamber and sensors over a run (fig. 3.15)."""
+    """Return the figure of chamber and sensors over a run [°C] (fig. 3.15)."""
     t, trace = _hours(run.trace), run.trace
     lines = [Series(n, t, v, style="line") for n, v in zip(SENSOR_NAMES, trace.sensors_c, strict=True)]
     chamber = [
@@ -31,7 +33,7 @@ def temperatures(run: RunFound) -> Figure:
 
 
 def indicator(run: RunFound) -> Figure:
-    """Second derivative of the case temperature (fig. 3.16)."""
+    """Return the figure of the second derivative of the case temperature, with the regime (fig. 3.16)."""
     t, scaled = _hours(run.trace), tuple(1e6 * a for a in run.trace.acceleration_c_s2)
     band = _regime(run.trace, [scaled])
     note = "The regime is dynamic from where the size passes its threshold until rate and second derivative are quiet."
@@ -40,7 +42,7 @@ def indicator(run: RunFound) -> Figure:
 
 
 def outputs(run: RunFound) -> tuple[Figure, Figure]:
-    """Accelerometers before and after correction (figs. 4.11 to 4.14)."""
+    """Return the figures of the accelerometers before and after correction (figs. 4.11 to 4.14)."""
     found: list[Figure] = []
     for what, lists, size, unit in (
         ("before correction", run.trace.before_m_s2, 1.0, "m/s²"),
@@ -55,7 +57,7 @@ def outputs(run: RunFound) -> tuple[Figure, Figure]:
 
 
 def magnitudes(run: RunFound) -> Figure:
-    """|ĝ| over a run, before and after (fig. 4.16)."""
+    """Return the figure of |ĝ| over a run, before and after correction (fig. 4.16)."""
     t, trace = _hours(run.trace), run.trace
     before, after = (
         tuple((v - sum(values) / len(values)) / units.MICRO_G for v in values)
@@ -66,7 +68,9 @@ def magnitudes(run: RunFound) -> Figure:
 
 
 def allan(curves: Sequence[AllanFound], axis: str) -> Figure:
-    """Allan deviation of an accelerometer over the whole cycle, before and after (fig. 4.15)."""
+    """Return the figure of an accelerometer's Allan deviation over the whole cycle, before and after correction (fig.
+    4.15).
+    """
     series: list[Series] = []
     for curve in curves:
         before, after, lower, upper = (
@@ -81,7 +85,7 @@ def allan(curves: Sequence[AllanFound], axis: str) -> Figure:
 
 
 def soak_figure(cycle: ThermalCycle) -> Figure:
-    """3σ before and after over the temperature of the case."""
+    """Return the figure of 3σ before and after correction over the temperature of the case."""
     x = tuple(s.case_c for s in cycle.soaks)
     series = [
         Series(f"{axis} {what}", x, tuple(values[i] for values in lists))

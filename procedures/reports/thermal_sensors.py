@@ -7,7 +7,7 @@ from procedures.core.report import Table
 
 
 def sections(cycle: ThermalCycle) -> tuple[Table, ...]:
-    """Those of the tables that a cycle has."""
+    """Return the tables of delay, hysteresis, gyros and coefficients that a cycle has."""
     made = (_delay(cycle), _hysteresis(cycle), _gyros(cycle), _coefficients(cycle))
     return tuple(table for table in made if table is not None)
 

@@ -13,7 +13,7 @@ OF_COEFFICIENT = ("1/°C²", "1/°C", "1/°C²", "1/°C", "m/s²/°C", "m/s²/°
 
 
 def summary(cycle: ThermalCycle) -> str:
-    """Summary of the cycle in two sentences."""
+    """Return the summary of the cycle in two sentences."""
     hours = sum(run.duration_s for run in cycle.runs) / units.HOUR
     judged = "the correction that was fitted to them" if cycle.judged == "fit" else "the unit's current correction"
     seen = "" if cycle.judged == "fit" else ", which they had no part in"
@@ -21,7 +21,7 @@ def summary(cycle: ThermalCycle) -> str:
 
 
 def tables(cycle: ThermalCycle) -> tuple[Table, ...]:
-    """Tables of a cycle in reading order."""
+    """Return all tables of a cycle, in reading order."""
     return (
         soak_table(cycle),
         forms_table(cycle),
@@ -38,7 +38,7 @@ def tables(cycle: ThermalCycle) -> tuple[Table, ...]:
 
 
 def soak_table(cycle: ThermalCycle) -> Table:
-    """Soak errors as in Table 4.5."""
+    """Return the table of soak errors as in Table 4.5."""
     rows = tuple(
         (s.leg + 1, s.target_c, s.case_c, s.runs, axis, s.before_m_s2[i], s.after_m_s2[i], s.spread_after_m_s2[i])
         for s in cycle.soaks
@@ -54,7 +54,7 @@ def soak_table(cycle: ThermalCycle) -> Table:
 
 
 def forms_table(cycle: ThermalCycle) -> Table:
-    """The ways to correct side by side."""
+    """Return the table of the forms of the correction, side by side."""
     single = next((f for f in cycle.forms if f.form == Form.SINGLE.value), None)
     rows: list[tuple[Cell, ...]] = []
     for f in cycle.forms:
@@ -70,7 +70,7 @@ def forms_table(cycle: ThermalCycle) -> Table:
 
 
 def coefficient_table(cycle: ThermalCycle) -> Table:
-    """K0, B0, α and β of the fit (Table 4.4)."""
+    """Return the table of K0, B0, α and β of the fit (Table 4.4)."""
     rows: list[tuple[Cell, ...]] = []
     for axis, found in zip(AXES, cycle.axes, strict=True):
         c = found.correction
@@ -89,7 +89,7 @@ def coefficient_table(cycle: ThermalCycle) -> Table:
 
 
 def order_table(cycle: ThermalCycle) -> Table:
-    """Table of the tests for the polynomial order."""
+    """Return the table of the tests for the polynomial order."""
     rows = tuple((axis, *_order(found)) for axis, found in zip(AXES, cycle.axes, strict=True))
     orders = len(cycle.axes[0].bic)
     columns = (
@@ -117,7 +117,7 @@ def _order(found: AxisFound) -> tuple[Cell, ...]:
 
 
 def accelerometer_correlations(cycle: ThermalCycle) -> Table:
-    """Table 4.3, and the same after correction."""
+    """Return Table 4.3, correlations with temperature, and the same after correction."""
     rows = tuple(
         (
             c.before.axis,
@@ -136,7 +136,7 @@ def accelerometer_correlations(cycle: ThermalCycle) -> Table:
 
 
 def gyro_correlations(cycle: ThermalCycle) -> Table:
-    """Gyro correlations as in Table 4.6."""
+    """Return the table of gyro correlations with temperature, as in Table 4.6."""
     per_degree = units.DEG_PER_HOUR
     rows: list[tuple[Cell, ...]] = []
     for g in cycle.gyros:
@@ -154,7 +154,7 @@ def gyro_correlations(cycle: ThermalCycle) -> Table:
 
 
 def gyro_noise_table(cycle: ThermalCycle) -> Table:
-    """Gyro noise as in Table 4.7, with the unit's known noise."""
+    """Return the table of gyro noise as in Table 4.7, with the unit's known noise."""
     shown = units.NOISE_DISPLAY["rad/s"]
     rows: list[tuple[Cell, ...]] = []
     for i, process in enumerate(("quantization", "random_walk", "bias_instability")):
@@ -176,7 +176,7 @@ def _noise(g: GyroNoise, process: int, size: float) -> tuple[Cell, Cell]:
 
 
 def magnitude_table(cycle: ThermalCycle) -> Table:
-    """Table of |ĝ| over each run."""
+    """Return the table of |ĝ| over each run, before and after correction."""
     rows = tuple(
         (run.name, before, after, *run.force_m_s2)
         for run, (before, after) in zip(cycle.runs, cycle.magnitude_m_s2, strict=True)
@@ -189,7 +189,7 @@ def magnitude_table(cycle: ThermalCycle) -> Table:
 
 
 def evidence_table(cycle: ThermalCycle) -> Table:
-    """Times at which each leg was reached and soaked."""
+    """Return the table of the times at which each leg was reached and soaked."""
     rows = tuple((run.name, i, *_evidence(leg)) for run in cycle.runs for i, leg in enumerate(run.legs, start=1))
     columns = (
         *(
@@ -215,7 +215,7 @@ def _evidence(leg: LegEvidence) -> tuple[Cell, ...]:
 
 
 def regime_table(cycle: ThermalCycle) -> Table:
-    """Compare switching times of the indicator with the commanded ramps."""
+    """Return the table that compares switching times of the indicator with the commanded ramps."""
     rows = tuple((run.name, i, *_regime(r)) for run in cycle.runs for i, r in enumerate(run.regimes, start=1))
     columns = (
         "run",

@@ -9,7 +9,7 @@ from procedures.core.report import Cell, Figure, Report, Series, Table
 
 
 def thermometer_report(found: Calibrated, target_c: Sequence[float], air_c: Sequence[float]) -> Report:
-    """Offsets and slopes, errors at the soaks, up against down, and the lines with the data."""
+    """Return the report: offsets and slopes, errors at the soaks, up against down, and the lines with the data."""
     rows: list[tuple[Cell, ...]] = [
         (s.channel, s.offset_c, s.offset_sd_c, s.slope, s.slope_sd, s.p_value) for s in found.sensors
     ]

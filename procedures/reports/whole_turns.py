@@ -8,7 +8,7 @@ from procedures.reports.calibration import coefficient_table
 
 
 def turns_table(found: WholeTurns) -> Table:
-    """Coefficients of the gyro triad, the terms beyond the linear ones included."""
+    """Return the table of the gyro triad's coefficients, the terms beyond the linear ones included."""
     note = (
         f"U = b + a + s/2·|a| + q·a²/a₀ + c·a³/a₀², a = K·ω, a₀ = {found.reference_rate_deg_s:g} deg/s. "
         f"Condition of the design {found.condition:.3g}."
@@ -17,7 +17,7 @@ def turns_table(found: WholeTurns) -> Table:
 
 
 def rate_table(found: WholeTurns) -> Table:
-    """Compare every station's scale factor with the model."""
+    """Return the table of every station's scale factor against the model."""
     ppm = units.PPM
     rows = tuple(
         (p.axis, p.rate_deg_s, p.turns, p.departure / ppm, p.standard_uncertainty / ppm, p.modelled / ppm)
@@ -28,7 +28,7 @@ def rate_table(found: WholeTurns) -> Table:
 
 
 def rate_figures(found: WholeTurns) -> tuple[Figure, ...]:
-    """Departure of the scale factor over the rates, one figure an axis."""
+    """Return the figures of the departure of the scale factor over the rates, one an axis."""
     judged = (
         "not judged: the noise was estimated from these data" if found.p_value is None else f"p = {found.p_value:.3g}"
     )

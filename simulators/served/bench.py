@@ -12,6 +12,7 @@ from simulators.served.at_once import at_once
 from simulators.served.chamber import TYPE, ChamberTalker, Controller
 from simulators.served.faults import Fault, FaultPlan
 from simulators.served.pace import Pace, PacedClock
+from simulators.served.person import PersonPort
 from simulators.served.ports import LinePort, Lines
 from simulators.served.scpi import ScpiLanguage
 from simulators.served.table import FAULT, ControlledTable
@@ -20,12 +21,13 @@ from simulators.served.unit_frames import CountFrames, IxcomFrames
 from simulators.truth import temperature_channels, unit_channels
 from simulators.world import SimulatedBench, WorldConfig, build
 
-Language = Literal["acutrol", "simserv", "ascii2", "scpi", "ixcom", "framed"]
+Language = Literal["acutrol", "simserv", "ascii2", "scpi", "ixcom", "framed", "person"]
 LANGUAGES: dict[str, tuple[str, ...]] = {
     "turntable": ("acutrol",),
     "chamber": ("simserv", "ascii2"),
     "supply": ("scpi",),
     "unit_link": ("ixcom", "framed"),
+    "operator": ("person",),
 }
 LOOK_S = 0.02
 """Real time between two looks at the plan of faults [s]."""
@@ -153,6 +155,8 @@ class ServedBench:
         options = device.options
         if name == "unit_link":
             return self._unit_port(device)
+        if name == "operator":
+            return PersonPort(self.bench.operator)
         if name == "supply":
             return LinePort(name, Lines(b"\n", ScpiLanguage(self.bench.supply).answer), self.plan, self._wait)
         if name == "chamber":

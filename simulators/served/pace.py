@@ -8,7 +8,10 @@ from simulators.clock import SimClock, Wait
 STEP_S = 0.002
 """Real time between two steps of the world [s]."""
 LONGEST_S = 0.05
-"""Longest real time that one step makes up for [s]: a slow machine makes the world late, never jumpy."""
+"""Longest real time that one step makes up for [s]."""
+MADE_UP_S = 1.0
+"""Longest real time by which the world may be late and is still led to the present, step by step [s]: a busy machine
+holds a process up for some tenths of a second, and a unit keeps its rate meanwhile. What is more is given up."""
 
 
 class PacedClock(SimClock):
@@ -46,14 +49,14 @@ class Pace:
         """Move the clock until cancelled."""
         begin, done = self._now_s(), 0
         rate = self._clock.rate_hz * self._factor
-        most = max(1, int(LONGEST_S * rate))
+        most, made_up = max(1, int(LONGEST_S * rate)), max(1, int(MADE_UP_S * rate))
         while True:
             await self._wait(STEP_S)
             due = int((self._now_s() - begin) * rate) - done
-            if due > most:
-                self.behind_s += (due - most) / self._clock.rate_hz
-                done += due - most
-                due = most
+            if due > made_up:
+                self.behind_s += (due - made_up) / self._clock.rate_hz
+                done += due - made_up
             if due > 0:
-                self._clock.go(due)
-                done += due
+                step = min(due, most)
+                self._clock.go(step)
+                done += step

@@ -5,6 +5,7 @@ from math import isfinite, pi
 
 import numpy as np
 
+from procedures.core.table_angles import TableAngles
 from simulators.clock import Motion, SimClock
 from simulators.served.axes import AxisPath, Paths, Swing, held, to_position, to_rate
 from simulators.truth import Array, BenchTruth
@@ -38,6 +39,17 @@ class AxisState:
     interlock: str = CLOSED
 
 
+@dataclass(frozen=True)
+class _Mounted:
+    """Unit on the table: encoder readings [deg], joint angles [rad], whole turns, pointing error and lean [rad]."""
+
+    encoders_deg: list[float]
+    angles_rad: Array
+    turns: Array
+    pointing: Array
+    lean: Array | None
+
+
 class ControlledTable(SimTurntable):
     """The same physics as `SimTurntable`, driven axis by axis; time passes by the clock alone."""
 
@@ -55,6 +67,8 @@ class ControlledTable(SimTurntable):
         self._paths: Paths | None = None
         self.stuck_deg: list[float] | None = None
         """Encoder readings of a table whose encoders are stuck."""
+        self._before: _Mounted | None = None
+        """Where the unit was on the table, while a person has set it by hand elsewhere."""
 
     def encoders_deg(self) -> list[float]:
         """Readings of the encoders; an axis with slip rings reads within half a turn."""
@@ -63,12 +77,22 @@ class ControlledTable(SimTurntable):
         return self.true_encoders_deg()
 
     def true_encoders_deg(self) -> list[float]:
-        """Readings that encoders give while they are not stuck."""
+        """Readings that encoders give while they are not stuck; a unit that is set by hand turns no axis."""
+        if self._before is not None:
+            return list(self._before.encoders_deg)
         angles = self.read_angles()
         read = [angles.outer_deg, angles.middle_deg, angles.inner_deg]
         return [
             a - 360.0 * round(a / 360.0) if limit.continuous else a for a, limit in zip(read, self.factory, strict=True)
         ]
+
+    def place(self, angles: TableAngles, lean_rad: Array) -> None:
+        """A person sets the unit by hand; the table stays as it is, and has the unit again with its next demand."""
+        before = self._before or _Mounted(
+            self.true_encoders_deg(), self._plant.angles_rad.copy(), self._turns, self._pointing, self._lean
+        )
+        super().place(angles, lean_rad)
+        self._before = before
 
     def load(self, kind: str, axis: int, value: float) -> None:
         """Load a demand; it acts at once where the axis is in its mode. Raises `Refused`."""
@@ -148,6 +172,7 @@ class ControlledTable(SimTurntable):
 
     def _act(self, axis: int) -> None:
         """Begin to do what is loaded in the axis' mode, from where its set point is."""
+        self._put_back()
         state, (position, rate) = self.axes[axis], self._set_point(axis)
         if state.mode == "position":
             self._moves += 1
@@ -162,6 +187,15 @@ class ControlledTable(SimTurntable):
             path = to_rate(position, rate, target, DEG * MARGIN * self.limits["rate", axis][1])
             self._turned[axis] = self._turned[axis] or self.factory[axis].continuous
         self._follow_paths(axis, path)
+
+    def _put_back(self) -> None:
+        """Put a unit that was set by hand back on the table, as it was there."""
+        if self._before is None:
+            return
+        before, self._before = self._before, None
+        self._turns, self._pointing, self._lean = before.turns, before.pointing, before.lean
+        self._plant.put(before.angles_rad)
+        self._lock()
 
     def _target(self, axis: int) -> float:
         """Joint angle of the loaded position [rad]: with slip rings the nearest of its turns."""

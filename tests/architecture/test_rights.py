@@ -1,7 +1,10 @@
 """The matrix of roles and routes is whole, and the page about it is what the routes say."""
 
+import re
+
 from bench_service.access.roles import Right, Role, has
 from bench_service.api.access.rights import READING, RIGHTS
+from tests.kit.documents import ROOT
 from tests.kit.rights_page import PAGE, allowed, routes, text
 
 
@@ -35,3 +38,11 @@ def test_the_rules_of_the_service_are_those_of_the_table() -> None:
     assert [role.value for role in Role if has(role, Right.OPERATE)] == ["operator", "engineer", "admin"]
     assert [role.value for role in Role if has(role, Right.ENGINEER)] == ["engineer", "admin"]
     assert [role.value for role in Role if has(role, Right.ACCESS)] == ["admin"]
+
+
+def test_the_page_of_accounts_offers_the_roles_that_there_are() -> None:
+    """The page has its own list, with a text for each role that is translated."""
+    script = (ROOT / "bench_service" / "pages" / "static" / "accounts.js").read_text(encoding="utf-8")
+    listed = re.search(r"^const ROLES = \[(.+)\];$", script, re.MULTILINE)
+    assert listed is not None
+    assert re.findall(r'\["(\w+)", t\(', listed[1]) == [role.value for role in Role]

@@ -9,9 +9,9 @@ import pytest
 NUMERICS = ("scipy", "matplotlib", "mujoco", "pywt")
 READERS = ("h5py", "nptdms", "rosbags", "pyarrow.dataset")
 FOR_SOME = ("argon2", "httpx", "pymodbus", "serial", "opentelemetry.sdk", "junitparser", "alembic", "dbos")
-SERVING = (*NUMERICS, *READERS, *FOR_SOME)
-"""Packages that a server loads after its first answer, or not at all."""
-COMMANDS = (*SERVING, "numpy", "pyarrow", "sqlalchemy", "fastapi", "uvicorn", "jinja2", "procedures", "simulators")
+SERVING = (*NUMERICS, *READERS, *FOR_SOME, "pyarrow", "jinja2", "bench_service.nouns")
+"""Packages and modules that a server loads after its first answer, or not at all."""
+COMMANDS = (*SERVING, "numpy", "sqlalchemy", "fastapi", "uvicorn", "procedures", "simulators")
 """Packages that the help of the command line does without."""
 
 

@@ -5,6 +5,7 @@ of their own, so that processor time is the driver's alone.
 """
 
 import asyncio
+import os
 import socket
 import subprocess
 import sys
@@ -24,6 +25,8 @@ from simulators.served.unit_frames import CountFrames
 RATE_HZ, CHANNELS = 2000.0, 12
 SHARE, LATENCY_MS = 0.20, 5.0
 QUESTIONS = 300
+RATE_DEG_S = 50.0
+"""Rate at which an axis is braked, for an example [deg/s]."""
 PREFIX = bytes(8)
 
 
@@ -153,6 +156,7 @@ def main() -> int:
         answer_statements(int(sys.argv[2]))
         return 0
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
+    print(f"load average {os.getloadavg()[0]:.1f}")
     with tempfile.TemporaryDirectory() as folder:
         port = _free_port()
         with _peer("send", port, seconds) as sender:
@@ -168,7 +172,12 @@ def main() -> int:
     print(f"unit link: {share:.1%} of a core (at most {SHARE:.0%})")
     print(
         f"table demand: {np.median(driven):.2f} ms, bare socket {np.median(raw):.2f} ms, added {added:.2f} ms "
-        f"(at most {LATENCY_MS:g}); 99 % {np.percentile(driven, 99):.2f} ms"
+        f"(at most {LATENCY_MS:g}); 99 % {np.percentile(driven, 99):.2f} ms, longest {driven.max():.2f} ms"
+    )
+    median, most = (RATE_DEG_S * 1e-3 * ms for ms in (np.median(driven), driven.max()))
+    print(
+        f"an axis at {RATE_DEG_S:g} deg/s that is braked by such a statement overshoots by {median:.2f} deg, by "
+        f"{most:.2f} deg at most; at a time factor of 10 by {10.0 * median:.1f} and {10.0 * most:.1f} deg"
     )
     return int(lost != 0 or share > SHARE or added > LATENCY_MS)
 

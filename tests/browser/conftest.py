@@ -7,11 +7,12 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, expect, sync_playwright
 
 from tests.browser.chromium import found
 from tests.end_to_end.bench_process import BenchProcess
 
+expect.set_options(timeout=20_000)  # of what is only waited for, on a busy machine; answers in time say their own
 CHROMIUM_ARGUMENTS = ("--no-sandbox", "--disable-dev-shm-usage")
 AWAY = re.compile(
     r"ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED|status of (4|5)"

@@ -46,6 +46,21 @@ def test_the_stop_of_the_log_in_page_needs_no_log_in(window: Watched) -> None:
     expect(page.locator("#away")).to_be_hidden()
 
 
+def test_the_stop_gets_through_where_the_log_in_has_ended(window: Watched) -> None:
+    window.expected = re.compile("status of 401")
+    page = window.open("/log-in?next=/campaigns", ready=False)
+    page.get_by_label("Name", exact=True).fill("ada")
+    page.get_by_label("Password").fill(PASSWORD)
+    page.locator("#log-in button").click()
+    expect(page.locator("form.stop .status")).not_to_be_empty(timeout=20_000)
+    token = page.locator("meta[name=csrf]").get_attribute("content")
+    end = "(token) => fetch('/api/v1/session', {method: 'DELETE', headers: {'X-CSRF-Token': token}}).then((a) => a.ok)"
+    assert page.evaluate(end, token)
+    expect(page.locator("#away")).to_contain_text("the stop works without one", timeout=15_000)
+    page.get_by_role("button", name="STOP sim").click()
+    expect(page.locator("form.stop output")).to_contain_text("has arrived", timeout=10_000)
+
+
 def test_an_admin_adds_a_person_and_a_token_that_is_shown_once_and_revokes_it(window: Watched) -> None:
     page = window.open("/log-in?next=/accounts", ready=False)
     page.get_by_label("Name", exact=True).fill("ada")

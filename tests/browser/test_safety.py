@@ -79,6 +79,73 @@ def test_the_stop_is_in_view_on_every_page_of_a_small_screen(window: Watched, se
     release_all(service)
 
 
+def reached(page: Page) -> bool:
+    """Whether a press on the middle of the stop's button falls on the button, not on what lies over it."""
+    return page.get_by_role("button", name="STOP sim").evaluate(
+        "b => { const r = b.getBoundingClientRect();"
+        " return document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2) === b; }"
+    )
+
+
+def stopped_by(page: Page, service: BenchProcess, job: str) -> None:
+    expect(page.locator("form.stop output")).to_contain_text("has arrived", timeout=10_000)
+    until(lambda: job_of(service, job)["state"] == "cancelled")
+    release_all(service)
+
+
+def test_a_stop_gets_through_an_open_dialog_by_mouse_and_by_keyboard(window: Watched, service: BenchProcess) -> None:
+    campaign = {"name": "night", "steps": [{"name": "nothing", "procedure": "no_operation"}]}
+    assert service.client.post("/api/v1/campaigns", json=campaign).is_success
+    schedule = {"cron": "0 1 * * *", "time_zone": "UTC", "campaign": "night", "unit": "SIM-0001"}
+    made = service.client.post("/api/v1/schedules", json=schedule)
+    assert made.is_success, made.text
+    page = window.open("/campaigns")
+    dialog, button = page.get_by_role("dialog"), page.get_by_role("button", name="STOP sim")
+    for width, key in ((1280, None), (400, "Shift+Tab")):
+        page.set_viewport_size({"width": width, "height": 700})
+        job = running(service)
+        page.locator("#schedules").get_by_role("button", name="Remove").click()
+        expect(dialog).to_be_in_viewport(ratio=1)
+        assert reached(page)
+        box, bar = dialog.bounding_box(), page.locator("#stopbar").bounding_box()
+        assert box is not None
+        assert bar is not None
+        assert box["y"] >= bar["y"] + bar["height"]
+        if key is None:
+            button.click(timeout=2000)
+        else:
+            page.keyboard.press(key)
+            expect(button).to_be_focused()
+            page.keyboard.press("Enter")
+        stopped_by(page, service, job)
+        expect(dialog).to_be_visible()
+        page.keyboard.press("Escape")
+        expect(dialog).to_have_count(0)
+        page.reload()
+    service.client.delete(f"/api/v1/schedules/{made.json()['id']}")
+
+
+def test_nothing_on_a_page_lies_over_the_stop(window: Watched, service: BenchProcess) -> None:
+    """With the first link focused, asked to cancel, and among the elements of the API's own page."""
+    job = running(service)
+    page = window.open(f"/jobs/{job}")
+    page.set_viewport_size({"width": 400, "height": 700})
+    page.keyboard.press("Tab")
+    expect(page.locator(".skip")).to_be_focused()
+    assert reached(page)
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.get_by_role("dialog")).to_be_visible()
+    assert reached(page)
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("button", name="Cancel")).to_be_focused()
+    docs = window.open("/docs")
+    docs.locator(".opblock-summary").first.wait_for(timeout=60_000)
+    docs.evaluate("scrollTo(0, document.body.scrollHeight)")
+    assert reached(docs)
+    assert press_stop(docs) < ANSWER_MS
+    stopped_by(docs, service, job)
+
+
 def test_the_stop_answers_with_ten_pages_of_running_jobs_open(window: Watched, service: BenchProcess) -> None:
     job = running(service)
     pages = [window.open(f"/jobs/{job}") for _ in range(10)]
@@ -152,6 +219,7 @@ def test_a_prompt_is_on_every_page_and_a_stale_answer_is_refused(window: Watched
     for page in (home, other):
         expect(page.locator(".prompt")).to_be_visible(timeout=20_000)
         expect(page).to_have_title(re.compile("To be done"))
+    expect(home.locator("form.stop .status")).to_contain_text("waits for a person")
     old = job_of(service, job)["prompt"]["id"]
     home.locator(".prompt").get_by_label("Remark").fill("x axis up")
     home.locator(".prompt").get_by_role("button", name="Done", exact=True).click()

@@ -72,7 +72,7 @@ def is_safe(state: dict[str, Any]) -> bool:
 
 
 def is_warm(state: dict[str, Any]) -> bool:
-    """Whether the chamber is led to anything but ambient."""
+    """Whether the chamber is commanded to anything but ambient."""
     return state["chamber_target_c"] not in (None, state["chamber_ambient_c"])
 
 

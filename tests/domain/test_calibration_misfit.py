@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from procedures import catalog
+from procedures.analysis.calibration import summary, triad_analysis
 from procedures.core.limits import Verdict
 from procedures.core.recording import MemoryRecording
 from procedures.core.unit import Unit
@@ -39,6 +40,16 @@ def test_a_clean_one_passes(context: Context, seed: int) -> None:
     result = calibrated(context, seed)
     assert result.verdict is Verdict.PASS
     assert all(t.misfit < 2.0 for t in result.triads)
+
+
+def test_a_triads_residuals_are_searched_for_flaws_once(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[object] = []
+    search = triad_analysis.suspect
+    for module in (triad_analysis, summary):
+        monkeypatch.setattr(module, "suspect", lambda *given: calls.append(given) or search(*given), raising=False)
+    params = CALIBRATION.resolve(CALIBRATION.params(dwell_s=60.0), context)
+    CALIBRATION.analyse(station_recordings(CALIBRATION.schedule(params), context.unit.channels), params, context)
+    assert len(calls) == 2, "gyros and accelerometers"
 
 
 def exchange(raw: list[np.ndarray], rng: np.random.Generator) -> None:

@@ -13,6 +13,7 @@ from procedures.bench.declared_device import DeclaredDevice
 from procedures.catalog import discover
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Verdict
+from procedures.core.measured import Measured, MeasuredPace
 from procedures.core.recording import AXES, MemoryRecording
 from procedures.core.unit import UnitDeclaration
 from procedures.procedure import Context
@@ -142,6 +143,53 @@ def test_another_clock_is_said(context: Context) -> None:
     off = found.clock_difference_ppm - 80.0
     assert abs(off) < FEW_SIGMAS * found.clock_difference_standard_uncertainty_ppm
     assert "the unit's clock differs from the bench's" in " ".join(result.warnings)
+
+
+def _parted(recording: MemoryRecording, samples: int, at: float) -> MemoryRecording:
+    """The recording without some samples at a share of its length: those after them come too early for the encoder."""
+    raw = recording.raw.astype(np.float64)
+    first, count = round(at * len(raw)), len(raw) - samples
+    raw[first:count, :3] = raw[first + samples :, :3]
+    return MemoryRecording(replace(recording.info, count=count), raw[:count])
+
+
+@pytest.mark.parametrize("at", [0.2, 0.5, 0.8])
+def test_clocks_that_part_within_a_recording_give_no_delay(context: Context, at: float) -> None:
+    """Four samples of 2.5 ms: a thousand times what the delay would be claimed with."""
+    params, recordings = taken(context, SwungUnit(1.0, 2e-3))
+    spoilt = [_parted(r, 4, at) for r in recordings]
+    with pytest.raises(
+        UnfitRecording, match=r"(changes|part) by .* within the recording: samples were lost, .* fell behind"
+    ):
+        RESPONSE.analyse(spoilt, params, context)
+
+
+@pytest.mark.parametrize("ppm", [3_000.0, 30_000.0, -5_000.0])
+def test_a_world_that_falls_behind_all_the_time_gives_no_delay(context: Context, ppm: float) -> None:
+    params, recordings = taken(context, SwungUnit(1.0, 2e-3, clock_ppm=ppm))
+    with pytest.raises(UnfitRecording, match=r"the unit's samples and the bench's clock part by -?\d"):
+        RESPONSE.analyse(recordings, params, context)
+
+
+def test_a_pace_that_was_measured_otherwise_is_refused_before_anything_is_fitted(context: Context) -> None:
+    params, recordings = taken(context, SwungUnit(1.0, 2e-3))
+    for behind_s, scatter_s, words in ((0.5, 0.01, "fell behind"), (-0.5, 0.01, "were ahead of"), (0.5, 0.3, "")):
+        pace = Measured(pace=MeasuredPace(behind_s, scatter_s))
+        made = [MemoryRecording(replace(r.info, measured=pace), r.raw) for r in recordings]
+        if not words:
+            assert RESPONSE.analyse(made, params, context).verdict is Verdict.PASS
+            continue
+        with pytest.raises(UnfitRecording, match=f"the unit's samples {words} the bench's clock by 0.5 s within"):
+            RESPONSE.analyse(made, params, context)
+
+
+def test_a_clock_within_a_quartz_counts_in_the_delays_uncertainty(context: Context) -> None:
+    params, recordings = taken(context, SwungUnit(1.0, 2e-3, clock_ppm=200.0))
+    found = RESPONSE.analyse(recordings, params, context).gyro.channels[0]
+    mean_s = np.mean([r.info.count / r.info.rate_hz for r in recordings])
+    assert found.delay_from_clock_s == pytest.approx(200e-6 * mean_s / np.sqrt(12.0), rel=0.05)
+    # The delay of a recording's middle is off by 200 ppm of half its length, 0.4 to 2 ms: it is claimed no better.
+    assert abs(found.delay_s - 2e-3) < 3.0 * found.delay_standard_uncertainty_s
 
 
 def test_more_noise_than_the_record_has_is_said(context: Context) -> None:

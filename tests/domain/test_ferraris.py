@@ -8,7 +8,7 @@ import pytest
 from procedures.analysis.calibration.reference import reference_vectors
 from procedures.analysis.calibration.station_noise import mean_covariance
 from procedures.analysis.calibration.table_errors import TableUncertainty
-from procedures.analysis.turns.ferraris import FACES, face_stations, ferraris_estimator, rests_and_turns
+from procedures.analysis.turns.ferraris import FACES, face_stations, ferraris_estimator, ferraris_flaws, rests_and_turns
 from procedures.catalog import discover
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -51,7 +51,7 @@ def test_the_six_faces_are_six() -> None:
 
 def test_exact_rests_and_turns_give_back_bias_and_matrix(sums: np.ndarray) -> None:
     motion = rests_and_turns(STATIONS, SECONDS, SITE)
-    made = ferraris_estimator(motion, None, TableUncertainty(), np.eye(3))
+    made = ferraris_estimator(motion, None, ferraris_flaws(motion, TableUncertainty()), np.eye(3))
     found = (made.gain @ sums.T.ravel()).reshape(3, 4)
     np.testing.assert_allclose(found[:, 1:], K_GYRO, atol=1e-8)
     np.testing.assert_allclose(found[:, 0], B_GYRO, atol=1e-3 * units.DEG_PER_HOUR)
@@ -65,7 +65,7 @@ def test_the_spread_of_the_gyros_is_as_claimed(sums: np.ndarray) -> None:
     dice, n = np.random.default_rng(2), 600
     motion = rests_and_turns(STATIONS, SECONDS, SITE)
     noise = np.array([mean_covariance(GYRO_NOISE, WINDOWS)] * 3)
-    made = ferraris_estimator(motion, noise, DECLARED, K_GYRO)
+    made = ferraris_estimator(motion, noise, ferraris_flaws(motion, DECLARED), K_GYRO)
     root = np.linalg.cholesky(noise[0])
     turned = [i for i, s in enumerate(STATIONS) if s.turn is not None]
     right_angles = 3.0 * units.ARCSEC * dice.normal(size=(n, 2))

@@ -152,13 +152,19 @@ def test_recordings_without_a_bench_are_brought_to_the_reference_by_the_units_co
         found.triads[0].calibration.standard_uncertainties, expected.calibration.standard_uncertainties, rtol=1e-6
     )
     assert found.thermal == share
+    applied = (
+        "Accelerometer outputs brought to the reference temperatures",
+        "What the thermal correction leaves uncertain",
+    )
+    assert set(applied) <= {s.title for s in method.report(found).sections}
     assert method.uses_corrections(found) == ("thermal",), "no gyros were calibrated"
     plain = method.analyse(Evidence(tuple(data)), params.model_copy(update={"thermal_correction": "none"}), unit)
     assert method.uses_corrections(plain) == ()
+    assert set(applied).isdisjoint(s.title for s in method.report(plain).sections)
     cold = replace(correction, fitted_range=TemperatureRange((-40.0, 30.0), (-40.0, 30.0)))
     beyond = method.analyse(Evidence(tuple(data)), params, replace(unit, thermal_correction=cold))
     assert any("beyond the range" in w for w in beyond.warnings)
-    with pytest.raises(BadParameter, match="has no thermal correction yet"):
+    with pytest.raises(BadParameter, match="has no current thermal correction"):
         method.analyse(Evidence(tuple(data)), params, replace(unit, thermal_correction=None))
     with pytest.raises(BadParameter, match="needs the recordings' unit"):
         method.analyse(Evidence(tuple(data)), params, None)

@@ -8,6 +8,8 @@ import pytest
 from pydantic import TypeAdapter
 
 from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.turns import fit as turns_fit
+from procedures.analysis.turns import summary
 from procedures.analysis.turns.fit import TERMS, Term, fit_turns, turn_flaws, turning
 from procedures.analysis.turns.plan import UPRIGHT, TurnPlan, TurnProgram, bench_time_s, longer_needed
 from procedures.bench.description import AxisLimits
@@ -56,7 +58,7 @@ def test_the_exact_outputs_of_a_flawless_table_give_back_every_coefficient(turna
     stations = SHORT.stations()
     sums = np.array([outputs(s, Flaws(), EVEN, CUBIC) for s in stations])
     motion = turning(stations, np.array([s.record_s for s in stations]), SITE)
-    fit = fit_turns(motion, sums, TERMS, REFERENCE, None, TableUncertainty())
+    fit = fit_turns(motion, sums, TERMS, REFERENCE, None, turn_flaws(motion, TableUncertainty()))
     errors = fit.parameters - truth(EVEN, CUBIC)
     # Left out of a is the Earth's part, which the square multiplies: 2q·Ω/a₀ = 5e-9 of the scale factor at q = 40 ppm.
     np.testing.assert_allclose(errors[:, 1:4], 0, atol=1e-8)
@@ -149,7 +151,7 @@ def test_errors_have_the_spread_that_is_claimed_and_residuals_the_chi_square(tur
             + np.einsum("nfc,f->nc", per_axis[:, :2], constant)
             + np.einsum("nfc,nf->nc", per_axis[:, 2:], each)
         )
-        fit = fit_turns(motion, y, TERMS, REFERENCE, noise, TableUncertainty(3.0, 1.0))
+        fit = fit_turns(motion, y, TERMS, REFERENCE, noise, turn_flaws(motion, TableUncertainty(3.0, 1.0)))
         errors.append((fit.parameters - truth(0 * EVEN, 0 * CUBIC)).ravel())
         claims.append(np.sqrt(np.diagonal(fit.covariance)))
         chi_square.append(fit.chi_square / fit.degrees_of_freedom)
@@ -224,6 +226,15 @@ def test_from_recordings_to_a_result_and_back(turnable: Context) -> None:
     np.testing.assert_allclose(calibration.matrix_array, K_GYRO, atol=2e-9)
     assert PROCEDURE.calibrations(result.model_copy(update={"make_calibration": False})) == ()
     assert len(PROCEDURE.report(result).sections) == 6
+
+
+def test_the_tables_flaws_are_worked_out_once_an_analysis(turnable: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    params, recordings = run(turnable)
+    calls: list[object] = []
+    monkeypatch.setattr(summary, "turn_flaws", lambda *given: calls.append(given) or turn_flaws(*given))
+    monkeypatch.setattr(turns_fit, "turn_flaws", lambda *given: calls.append(given) or turn_flaws(*given))
+    PROCEDURE.analyse(recordings, params, turnable)
+    assert len(calls) == 1
 
 
 def test_unknown_noise_is_estimated_from_the_residuals(turnable: Context) -> None:

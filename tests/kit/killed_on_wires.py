@@ -41,7 +41,7 @@ class World:
     powered: bool
     air_c: float
     target_c: float | None
-    """Temperature that the chamber is led to; None: it is switched off, or there is none."""
+    """Temperature that the chamber is commanded to; None: it is switched off, or there is none."""
 
     @property
     def under_way(self) -> bool:
@@ -51,7 +51,7 @@ class World:
 
     @property
     def safe(self) -> bool:
-        """True where the table rests, the unit is off and the chamber is led to ambient."""
+        """True where the table rests, the unit is off and the chamber is commanded to ambient."""
         return self.rate_deg_s < AT_REST_DEG_S and not self.powered and self.target_c in (None, AMBIENT_C)
 
 

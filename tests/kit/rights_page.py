@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bench_service.access.roles import LEAST, RANK, Right, Role
+from bench_service.api import health
 from bench_service.api.access.rights import right_of
-from bench_service.app import PAGES, ROUTERS
+from bench_service.nouns import PAGES, ROUTERS
 
 PAGE = Path(__file__).parents[2] / "docs" / "rights.md"
 HEAD = """# Rights: role by route
@@ -39,10 +40,12 @@ class RouteRight(NamedTuple):
 
 def routes() -> Iterator[RouteRight]:
     """Every verb of every route of the application."""
-    for module in (*ROUTERS, *PAGES):
-        for route in module.router.routes:
-            for method in sorted(route.methods):
-                yield RouteRight(method, route.path, route.name, right_of(route.name, method), route.include_in_schema)
+    for module in (health, *ROUTERS, *PAGES):
+        shown = module.router.include_in_schema
+        for path, endpoint, options in module.router.declared:
+            name = endpoint.__name__
+            for method in sorted(options["methods"]):
+                yield RouteRight(method, path, name, right_of(name, method), shown and options["include_in_schema"])
 
 
 def allowed(right: Right, role: Role | None) -> bool:

@@ -7,6 +7,8 @@ from simulators.served.unit_frames import CountFrames
 
 LANGUAGES = {"turntable": "acutrol", "supply": "scpi", "unit_link": "framed"}
 THERMAL_LANGUAGES = {**LANGUAGES, "chamber": "simserv"}
+PERSON = {"operator": "person"}
+"""Language of the person, who sets the unit by hand."""
 AMBIENT_C = 22.0
 CHAMBER = """
 [chamber]
@@ -17,7 +19,7 @@ limits = {{ minimum_c = -60, maximum_c = 85, ramp_c_min = 3, ambient_c = {} }}
 """
 UNIT = """
 serial = "GL017"
-sample_rate_hz = 400
+sample_rate_hz = {}
 """
 
 
@@ -34,10 +36,11 @@ def bench_file(folder: Path, behind: Any, factor: float, after_demand_s: float |
         for c in behind.bench.bench.imu.channels
     )
     (folder / "units").mkdir()
-    (folder / "units" / "GL017.toml").write_text(UNIT + channels)
+    (folder / "units" / "GL017.toml").write_text(UNIT.format(behind.bench.clock.rate_hz) + channels)
     axis = "minimum_deg = -400, maximum_deg = 400, rate_deg_s = 60, acceleration_deg_s2 = 100"
     numbers = behind.numbers
     chamber = "" if "chamber" not in numbers else CHAMBER.format(numbers["chamber"], AMBIENT_C)
+    person = f'[operator]\naddress = "tcp://127.0.0.1:{numbers["operator"]}"' if "operator" in numbers else ""
     pause = "" if after_demand_s is None else f"after_demand_s = {after_demand_s}"
     path = folder / "east.toml"
     path.write_text(f"""
@@ -64,6 +67,7 @@ limits = {{ maximum_v = 36.0, maximum_a = 5.0, nominal_v = 28.0, nominal_a = 3.0
 driver = "framed"
 address = "tcp://127.0.0.1:{numbers["unit_link"]}"
 frame = "frame.toml"
+{person}
 [simulation]
 time_factor = {factor}
 """)

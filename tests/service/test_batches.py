@@ -34,6 +34,7 @@ def test_a_selection_is_analysed_once_and_a_second_batch_takes_what_is_stored(sq
     own = {"points": 37}  # no other test of the module, which may have run before this one, asks for this content
     first = ended(sqlite_client, submitted(sqlite_client, wanted, parameters=own))
     assert (first["state"], first["total"], first["counts"]["done"]) == ("succeeded", 12, 12)
+    assert first["selection"] == wanted, "the query is shown as it was submitted"
     tasks = sqlite_client.http.get(f"{PATH}/{first['id']}/tasks", params={"limit": 5}).json()
     assert [task["number"] for task in tasks["items"]] == list(range(5))
     rest = sqlite_client.http.get(f"{PATH}/{first['id']}/tasks", params={"after": tasks["next"]}).json()

@@ -114,6 +114,7 @@ def test_commanded_angles_are_used_where_the_encoders_are_not_declared_better(tm
         ("ambient_c = 22", "ambient_c = 99", ("chamber.limits", "ambient_c = 99 must be within -55")),
         ('id = "east"', 'id = "East Side"', ("line 3", "bench.id")),
         ("[supply]", "[suply]", ("suply is no field",)),
+        ("[supply]", '[operator]\naddress = "udp://127.0.0.1:9"\n[supply]', ("operator.address", "listens on tcp")),
     ],
 )
 def test_a_mistake_is_answered_with_line_and_field(tmp_path: Path, old: str, new: str, words: tuple[str, ...]) -> None:

@@ -65,15 +65,31 @@ def test_one_of_a_failed_result_is_chosen_with_a_remark(client: Client, database
     try:
         one = stores.results.get(made[0]["result"])
         failed = type(one)(**{**vars(one), "id": f"{one.id}-failed", "verdict": Verdict.FAIL})
-        stores.results.add(failed, by_rule=False, corrections=[gyros(3)])
+        stores.results.add(failed, corrections=[gyros(3)])
     finally:
         database.dispose()
     (stored,) = client.http.get(f"{UNIT}/corrections", params={"kind": "gyros"}).json()["items"]
+    assert (stored["current"], stored["verdict"]) == (False, "fail"), "a failed one never counts by itself"
+    assert f"result {failed.id}, whose verdict is fail" in stored["not_current"]
+    assert f"result {failed.id}, whose verdict is fail" in page(client, "/units/SIM-0001").words
+    assert client.http.get(UNIT).json()["gyro_correction"] is None
     refused = client.http.post(f"{UNIT}/corrections/{stored['id']}/current")
     assert (refused.status_code, refused.headers["content-type"]) == (409, "application/problem+json")
     assert "give a remark" in refused.json()["detail"]
     body = {"by": "Ann", "remark": "the limit was for another model"}
     assert client.http.post(f"{UNIT}/corrections/{stored['id']}/current", json=body).json()["current"]
+
+
+def test_a_kind_is_given_back_to_the_rule(client: Client, made: list[dict]) -> None:
+    one = f"{UNIT}/corrections/{made[1]['id']}"
+    chosen = client.http.post(f"{one}/current", json={"by": "Ann"}).json()
+    assert (chosen["current"], chosen["by_rule"]) == (True, False)
+    assert page(client, "/units/SIM-0001").words.count("chosen by Ann") >= 1
+    refused = client.http.post(f"{UNIT}/corrections/choose-by-rule", json={"kind": "thermal", "by": "Ann"})
+    assert (refused.status_code, refused.headers["content-type"]) == (409, "application/problem+json")
+    assert "no job that passed has given unit SIM-0001" in refused.json()["detail"], "its corrections are of no job"
+    unknown = client.http.post(f"{UNIT}/corrections/choose-by-rule", json={"kind": "magnetic"})
+    assert unknown.json()["errors"][0]["field"] == "kind"
 
 
 def test_what_does_not_exist_is_a_problem_that_says_so(client: Client, made: list[dict]) -> None:

@@ -31,7 +31,7 @@ class _Bench:
         self.time_s = 0.0
         self.asked = 0
         self._errors, self._currents = errors, currents
-        self.description = SimpleNamespace(accuracy=TableAccuracy(0.0, 1.0, 0.0))
+        self.description = SimpleNamespace(accuracy=TableAccuracy(0.0, 1.0, 0.0), devices=())
         self.clock = SimpleNamespace(now_s=lambda: self.time_s)
         self.turntable = SimpleNamespace(read=self._table)
         self.supply = SimpleNamespace(read=self._supply)
@@ -52,7 +52,7 @@ class _Bench:
 
 
 def _watched(bench: _Bench, station: Station = STATION, seconds: int = 10) -> DeviceLog:
-    log = DeviceLog(cast(Any, bench), station)
+    log = DeviceLog(cast(Any, bench), station, 0.0)
 
     async def look() -> None:
         for quarter in range(4 * seconds):

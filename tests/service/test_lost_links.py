@@ -35,7 +35,7 @@ CHAMBER = "the chamber cannot be reached: its link is lost"
 
 @pytest.fixture
 def register(tmp_path: Path) -> DeviceRegister:
-    """Register of a bench that a process left in a move, its chamber led to 60 °C, its ambient being 22 °C."""
+    """Register of a bench that a process left in a move, its chamber commanded to 60 °C, its ambient being 22 °C."""
     made = abandoned(tmp_path, "job-1")
     link = made.open("a process that died too")
     link.note("chamber.command", {}, chamber_target_c=60.0, chamber_ambient_c=22.0)
@@ -85,7 +85,7 @@ def test_what_can_be_reached_is_made_safe_and_what_cannot_is_named(register: Dev
         ]
         left = state(register)
         assert (left.table, left.powered, left.chamber_target_c) == (AT_REST, True, 60.0)
-        assert left.unsafe[:2] == ("the unit is on", "the chamber is led to 60 °C")
+        assert left.unsafe[:2] == ("the unit is on", "the chamber is commanded to 60 °C")
         assert left.fault == f"{CHAMBER}; the supply cannot be reached: its link is lost"
         assert not left.linked, "the link of the others is kept from everybody"
     register.cables.file("supply").unlink()

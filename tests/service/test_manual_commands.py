@@ -49,7 +49,7 @@ def test_manual_mode_from_start_to_end(bench: Bench) -> None:
     assert (refused.code, "halt it" in refused.out) == (1, True)
     assert bench("halt", "--by", "ann").out == "halt: done: the table rests\n"
     assert "on: 28.000 V" in bench("supply", "on", "--by", "ann").out
-    assert bench("chamber", "30", "--by", "ann").out.startswith("chamber: done: led to 30 °C at ")
+    assert bench("chamber", "30", "--by", "ann").out.startswith("chamber: done: commanded to 30 °C at ")
     one_line(bench("supply", "of", "--by", "ann"), "supply_of")
     shown = bench("read").out
     assert all(word in shown for word in ("outer angle", "middle rate", "set point", "supply voltage")), shown

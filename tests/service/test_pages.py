@@ -97,6 +97,26 @@ def test_the_page_of_an_imported_result_has_no_job(sqlite_client: Client) -> Non
     assert not any((value or "").startswith("/jobs/") for name, value in shown.attributes if name == "href")
 
 
+def test_a_unit_that_no_bench_has_is_offered_for_analysis_and_not_for_a_job(sqlite_client: Client) -> None:
+    channels = [{"name": "gyro_x", "column": 0, "quantity": "angular_rate", "unit": "deg/s"}]
+    lines = "".join(f"{0.01 * (k % 7)}\n" for k in range(2000)).encode()
+    made = sqlite_client.import_files({"unit": "A-PAPER", "rate_hz": 100.0, "channels": channels}, lines)
+    assert made.status_code == 201, made.text
+    home = page(sqlite_client, "/")
+    links = [value for name, value in home.attributes if name == "href" and value and "unit=" in value]
+    assert "/recordings?unit=A-PAPER#run" in links
+    assert not any(link.startswith("/start") and "A-PAPER" in link for link in links)
+    assert links.index("/start?unit=SIM-0001") < links.index("/recordings?unit=A-PAPER#run")
+    for path in ("/units", "/units/A-PAPER"):
+        assert not any(
+            (value or "").startswith("/start?unit=A-PAPER") for _, value in page(sqlite_client, path).attributes
+        )
+    result = sqlite_client.analyse("allan_deviation", recordings=[made.json()["id"]]).json()
+    shown = page(sqlite_client, result["page"])
+    assert "1 file0.csv" in shown.words
+    assert page(sqlite_client, f"/recordings/{made.json()['id']}").words.count("file0.csv") == 2  # title and heading
+
+
 def test_an_address_that_is_markup_comes_back_as_data(sqlite_client: Client) -> None:
     for path in (f"/jobs/{EVIL.replace('/', '%2F')}", "/units/%3Cb%3Ex", "/results/%3Csvg%20onload=alert(1)%3E"):
         answer = sqlite_client.http.get(path)

@@ -57,7 +57,7 @@ def test_a_unit_without_a_correction_is_told_so_before_anything_moves(client: Cl
     answer = client.http.post("/api/v1/procedures/calibration_12_orientations/preview", json=body)
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["field"].endswith("thermal_correction")
-    assert "RANDOM-5 has no thermal correction" in answer.text
+    assert "RANDOM-5 has no current thermal correction" in answer.text
 
 
 def test_the_converters_bench_gives_the_unit_its_first_stage(client: Client, stage_one: dict) -> None:

@@ -1,5 +1,6 @@
 """Figures of a service over a soak, and whether memory, descriptors, threads and logs stay level."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -67,14 +68,35 @@ def judged(name: str, found: Slope) -> list[str]:
     return [f"{name}: {found} MB does not tell growth by {LEVEL_MB} MB from none: the soak was too short or too uneven"]
 
 
-def judged_counts(samples: Samples) -> list[str]:
-    """Print descriptors and threads by quarter; return those that grow."""
+def judged_counts(series: Mapping[str, Sequence[int]]) -> list[str]:
+    """Print counts by quarter, each by its name; return those that grow."""
     wrong: list[str] = []
-    for name, counts in (("descriptors", samples.descriptors), ("threads", samples.threads)):
-        quarters = np.array_split(np.array(counts), 4)
+    for name, counts in series.items():
+        if not counts:
+            wrong.append(f"{name}: not determined: there is no sample of the service")
+            continue
+        quarters = np.array_split(np.array(counts), min(4, len(counts)))
         print(f"{name}: {', '.join(str(int(q.max())) for q in quarters)} at most in each quarter")
-        if quarters[3].max() > quarters[1].max() + GROWN:
+        if len(quarters) == 4 and quarters[3].max() > quarters[1].max() + GROWN:
             wrong.append(f"{name} grow: {quarters[1].max()} to {quarters[3].max()}")
+    return wrong
+
+
+def growing(samples: Samples, minutes: float) -> list[str]:
+    """Print threads and memory of a short soak; return what grows, and memory whose growth is not determined."""
+    wrong = judged_counts({"threads": samples.threads})
+    times, memory = np.array(samples.minutes), np.array(samples.memory_mb)
+    late = times >= minutes / 4.0
+    quarters = [float(q.mean()) for q in np.array_split(memory, 4) if len(q)]
+    print(f"memory: {', '.join(f'{q:.1f}' for q in quarters)} MB by quarter, {max(memory, default=0.0):.0f} MB at most")
+    try:
+        found = slope(times[late], memory[late])
+    except ValueError as error:
+        wrong.append(f"memory: its growth is not determined: {error}; the last three quarters of a soak count")
+        return wrong
+    print(f"  over the last {0.75 * minutes:.0f} min: {found} MB")
+    if found.low > LEVEL_MB:
+        wrong.append(f"memory grows by {found} MB")
     return wrong
 
 
@@ -98,7 +120,7 @@ def judge(samples: Samples, minutes: float) -> list[str]:
             wrong += faults
         else:  # children come and go: what they add is uneven
             print("".join(f"  {fault}" for fault in faults) or "  level")
-    wrong += judged_counts(samples)
+    wrong += judged_counts({"descriptors": samples.descriptors, "threads": samples.threads})
     print(f"write-ahead log: {max(samples.wal_mb):.1f} MB at most")
     if max(samples.wal_mb) > WAL_MB:
         wrong.append(f"the write-ahead log has {max(samples.wal_mb):.0f} MB")

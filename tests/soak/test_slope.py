@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.soak.level import LEVEL_MB, judged
+from tests.soak.level import LEVEL_MB, Samples, growing, judged
 from tests.soak.slope import Slope, slope
 
 MINUTES = np.arange(45.0)
@@ -47,3 +47,23 @@ def test_level_is_an_interval_below_the_bound_and_neither_growth_nor_ignorance()
     assert judged("memory", Slope(-LEVEL_MB, -2 * LEVEL_MB, 0.0)) == []
     assert "grows" in judged("memory", Slope(2 * LEVEL_MB, 1.5 * LEVEL_MB, 2.5 * LEVEL_MB))[0]
     assert "does not tell" in judged("memory", Slope(0.5 * LEVEL_MB, -LEVEL_MB, 2 * LEVEL_MB))[0]
+
+
+def a_service(minutes: np.ndarray, memory_mb: np.ndarray) -> Samples:
+    """Samples of a service whose descriptors and threads stay as they are."""
+    count = len(minutes)
+    return Samples(minutes.tolist(), memory_mb.tolist(), memory_mb.tolist(), [50] * count, [30] * count)
+
+
+def test_memory_without_a_slope_is_not_determined_and_no_pass(capsys: pytest.CaptureFixture[str]) -> None:
+    short = np.arange(0.0, 6.0, 0.1)
+    (unknown,) = growing(a_service(short, 0.0 * short), 6.0)
+    assert unknown.startswith("memory: its growth is not determined: 5 minutes are too few for a slope: 8 are needed")
+    assert growing(a_service(MINUTES, 200.0 + 0.0 * MINUTES), 45.0) == []
+    (grown,) = growing(a_service(MINUTES, 200.0 + MINUTES), 45.0)
+    assert grown.startswith("memory grows by +1.000 a minute")
+    assert [text.split(":")[1] for text in growing(Samples(), 45.0)] == [
+        " not determined",
+        " its growth is not determined",
+    ]
+    assert "MB by quarter" in capsys.readouterr().out

@@ -9,7 +9,7 @@ releases the bench. With `--kill-s` the service is killed as well, at random tim
 * no demand for an angle of one station came twice to the table (its own journal is the witness), but for a station that
   is repeated after a kill;
 * no job failed without a reason, nor without a fault, and jobs succeed after the last fault;
-* descriptors and threads stay level, and memory shows no growth (not judged with kills).
+* descriptors and threads stay level, and memory has a slope that shows no growth (not judged with kills).
 """
 
 import argparse
@@ -17,7 +17,8 @@ import os
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -33,8 +34,8 @@ from tests.benchmarks.process import free_port
 from tests.conformance.served import served
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.wired_bench import THERMAL_LANGUAGES, bench_file
-from tests.soak.level import LEVEL_MB, Samples, judged_counts
-from tests.soak.slope import slope
+from tests.soak.descriptors import Descriptors, descriptors_of
+from tests.soak.level import Samples, growing
 from tests.soak.wire_faults import Faults
 from tests.soak.wire_journal import Journal
 
@@ -44,6 +45,9 @@ EVERY_S = 2.0
 """Interval between two looks at the process [s]."""
 CALM_S = 25.0
 """Time without faults at the end, in which a job must succeed [s]."""
+WARM_S = 60.0
+"""Longest wait for the process that draws [s]. The service begins it while no job runs: under load that is late, and
+its nine pipes are no growth."""
 MANUAL, MANUAL_SHARE = "/api/v1/benches/east/manual", 0.15
 BY_HAND_S = 4.0
 EXPLAINED_S = 90.0
@@ -160,47 +164,16 @@ def checked_recordings(load: WiredLoad, client: httpx.Client, journal: Journal) 
     return good, wrong
 
 
-def level(samples: Samples, minutes: float) -> list[str]:
-    """Print the service's figures; a sentence for each that grows."""
-    wrong = judged_counts(samples)
-    times, late = np.array(samples.minutes), np.array(samples.minutes) >= minutes / 4.0
-    memory = np.array(samples.memory_mb)
-    quarters = [float(q.mean()) for q in np.array_split(memory, 4)]
-    print(f"memory: {', '.join(f'{q:.1f}' for q in quarters)} MB by quarter, {memory.max():.0f} MB at most")
-    try:
-        found = slope(times[late], memory[late])
-    except ValueError as error:
-        print(f"  no slope: {error}")
-        return wrong
-    print(f"  over the last {0.75 * minutes:.0f} min: {found} MB")
-    if found.low > LEVEL_MB:
-        wrong.append(f"memory grows by {found} MB")
-    return wrong
-
-
-def _watched(bench: BenchProcess, samples: Samples, since_s: float, folder: Path) -> None:
-    try:
-        samples.take((monotonic_s() - since_s) / 60.0, psutil.Process(bench.process.pid), folder)
-    except psutil.NoSuchProcess:
-        return
-
-
-def descriptors_of(process_id: int) -> Counter[str]:
-    """Open descriptors of a process by what they are: the name of a file, or sockets, pipes and the like."""
-    found: Counter[str] = Counter()
-    folder = Path(f"/proc/{process_id}/fd")
-    for entry in folder.iterdir():
-        try:
-            target = os.readlink(entry)
-        except OSError:
-            continue
-        found[Path(target).name if target.startswith("/") else target.split(":")[0]] += 1
-    return found
+@contextmanager
+def _looked_at(bench: BenchProcess) -> Generator[psutil.Process]:
+    """The service's process; what is taken of it is left out where it has ended."""
+    with suppress(psutil.NoSuchProcess):
+        yield psutil.Process(bench.process.pid)
 
 
 def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) -> list[str]:
     """Run the soak; print its figures, and return what was not kept."""
-    chance, samples = Random(seed), Samples()
+    chance, samples, descriptors = Random(seed), Samples(), Descriptors()
     with tempfile.TemporaryDirectory(prefix="wires-") as name, served(THERMAL_LANGUAGES, True, factor) as behind:
         folder, journal, faults = Path(name), Journal(behind), Faults(behind, Random(seed + 1), mean_s)
         file = bench_file(folder, behind, factor, after_demand_s=0.02)
@@ -210,7 +183,9 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
         kills, next_kill_s = list[float](), monotonic_s() + (chance.expovariate(1.0 / kill_s) if kill_s else np.inf)
         try:
             bench.start()
-            begun_s, looked_s = monotonic_s(), 0.0
+            bench.until(lambda: descriptors_of(psutil.Process(bench.process.pid), {})["pipe"] > 0, WARM_S)
+            begun_s, looked_s, at_rest_s = monotonic_s(), 0.0, 0.0
+            names = {bench.client.base_url.port or 0: "clients"} | {n: f"the {k}" for k, n in behind.numbers.items()}
             end_s = begun_s + 60.0 * minutes
             while monotonic_s() < end_s:
                 if monotonic_s() < end_s - CALM_S:
@@ -220,16 +195,22 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
                 if monotonic_s() > next_kill_s and monotonic_s() < end_s - 2.0 * CALM_S:
                     bench.kill()
                     bench.start()
-                    kills, samples = [*kills, monotonic_s()], Samples()
+                    kills, samples, descriptors = [*kills, monotonic_s()], Samples(), Descriptors()
                     next_kill_s = monotonic_s() + chance.expovariate(1.0 / kill_s)
                 load.step()
+                if load.idle and monotonic_s() - at_rest_s > 1.0:  # between two jobs: what a job needs is given back
+                    at_rest_s = monotonic_s()
+                    with _looked_at(bench) as process:
+                        descriptors.take((at_rest_s - begun_s) / 60.0, descriptors_of(process, names))
                 if monotonic_s() - looked_s > EVERY_S:
                     looked_s = monotonic_s()
-                    _watched(bench, samples, begun_s, folder)
+                    with _looked_at(bench) as process:
+                        samples.take((looked_s - begun_s) / 60.0, process, folder)
                 pause(0.1)
             bench.until(lambda: _idle(load), 120)
-            print(f"descriptors at the end: {dict(descriptors_of(bench.process.pid).most_common(12))}")
+            print(f"descriptors at the end: {dict(descriptors.kinds[-1].most_common())}")
             good, wrong = checked_recordings(load, bench.client, journal)
+            print(f"samples behind the bench's clock: {_behind(load)}")
         finally:
             bench.end()
         wrong += _of_jobs(load, [*faults.times, *kills], journal, end_s - CALM_S, len(kills))
@@ -238,7 +219,14 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
         print(*(f"  {count} × {reason}" for reason, count in load.reasons.most_common(12)), sep="\n")
         late_s = behind.bench.pace.behind_s
         print(f"table: {journal.demands} demands, {journal.requests} requests; {late_s:.1f} s of bench time given up")
-    return wrong + (level(samples, minutes) if not kill_s else [])
+    return wrong + (descriptors.judged(minutes) + growing(samples, minutes) if not kill_s else [])
+
+
+def _behind(load: WiredLoad) -> str:
+    """Recordings whose pace was measured, and the worst of them."""
+    paces = [p for r in load.recordings() if (p := (r.get("measured") or {}).get("pace")) is not None]
+    worst = max((abs(p["behind_s"]) for p in paces), default=0.0)
+    return f"{worst:.2f} s at worst within {RECORD_S:g} s, of {len(paces)} recordings whose pace was measured"
 
 
 def _idle(load: WiredLoad) -> bool:

@@ -6,6 +6,7 @@ gyros alone by a whole-turns job (c), which was current: it had removed the acce
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,16 +15,17 @@ import sqlalchemy as sa
 from pydantic_core import to_jsonable_python
 
 from bench_service.campaigns.stores import Stores
-from bench_service.model.context import CONTEXT, context_of
+from bench_service.model.context import CONTEXT, context_document, context_of, withheld_calibration
 from bench_service.model.job import Job, JobState
 from bench_service.persistence import Database, open_stores
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.site import Site
-from procedures.core.unit import Unit
+from procedures.core.unit import Unit, Withheld
 from procedures.procedure import Context
 from tests.kit.calibrations import document_of, triad
+from tests.kit.procedures import simulated_context
 from tests.storage.conftest import NOW
 from tests.storage.migrating import migrated
 
@@ -208,3 +210,20 @@ def test_the_way_back_and_forth_again_keeps_it(
     assert after.keys() == before.keys()
     for key, calibration in after.items():
         assert_value(calibration.value, before[key].value)
+
+
+def test_contexts_of_earlier_versions_say_what_was_withheld(new_job: Callable[..., Job]) -> None:
+    """They called the kind of a withheld correction its triad."""
+    context = simulated_context()
+    unit = replace(context.unit, withheld=(Withheld("gyro", "c1", "it expired"), Withheld("thermal", "c2", "rejected")))
+    today = context_document(replace(context, unit=unit))
+    early = {**today, "unit": {**today["unit"], "withheld": [old_form(w) for w in today["unit"]["withheld"]]}}
+    for document in (today, early):
+        job = new_job(context=document)
+        assert context_of(job, lambda _: ()).unit.withheld == unit.withheld
+        assert withheld_calibration(job, ["gyro", "accelerometer"]) == "it expired"
+        assert context_of(job, lambda _: ()).unit.why_withheld("thermal") == "rejected"
+
+
+def old_form(entry: dict[str, str]) -> dict[str, str]:
+    return {"triad": entry["subject"], "id": entry["id"], "why": entry["why"]}

@@ -9,8 +9,10 @@ import pytest
 
 from bench_service import wall_clock
 from bench_service.campaigns.stores import Stores
+from bench_service.evidence.corrections import StoredCorrection
 from bench_service.model.calibrations import Act, Approval, Decider
 from bench_service.model.errors import CorrectionRefused, IdempotencyConflict, NotFound
+from bench_service.model.job import Job, JobState
 from bench_service.model.records import Idempotency, StoredResult
 from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
@@ -70,6 +72,30 @@ def test_one_of_a_result_that_did_not_pass_is_chosen_with_a_remark(
     assert stores.corrections.make_current("U-1", good.id, Decider("Bo")).current
 
 
+@pytest.mark.parametrize("verdict", [Verdict.FAIL, Verdict.ERROR])
+def test_one_of_a_job_that_did_not_pass_never_becomes_current_by_itself(
+    stores: Stores, new_result: NewResult, verdict: Verdict
+) -> None:
+    stores.units.put_unit(Unit("U-1", 100.0, CHANNELS))
+    alone = stores.results.add(new_result(verdict=verdict), corrections=[thermal(1), thermometers(1)])
+    assert not any(c.current for c in stores.corrections.list("U-1").items)
+    assert stores.units.unit("U-1").thermal_correction is None
+    stores.results.add(new_result(), corrections=[thermal(2)])
+    stores.results.add(new_result(verdict=verdict), corrections=[thermal(3)])
+    failed, good, first = stores.corrections.list("U-1", kind="thermal").items
+    assert [c.current for c in (failed, good, first)] == [False, True, False], "a failed one takes nobody's place"
+    assert (first.result_id, first.verdict, good.verdict) == (alone.id, verdict, Verdict.PASS)
+    assert good.why_not_current == ""
+    assert f"result {alone.id}, whose verdict is {verdict}" in first.why_not_current
+    chosen = stores.corrections.make_current("U-1", failed.id, ANN)
+    assert (chosen.current, chosen.why_not_current) == (True, "")
+    stores.results.add(new_result(), by_rule=False, corrections=[thermal(4)])
+    analysed = stores.corrections.list("U-1", kind="thermal").items[0]
+    assert "second analysis or a method" in analysed.why_not_current
+    stores.corrections.make_current("U-1", good.id, ANN)
+    assert "another one has taken its place" in stores.corrections.get("U-1", failed.id).why_not_current
+
+
 def test_a_person_chooses_which_one_is_current(stores: Stores, new_result: NewResult) -> None:
     for seed in (1, 2):
         stores.results.add(new_result(), corrections=[thermal(seed), converter(seed)])
@@ -92,6 +118,36 @@ def test_a_person_chooses_which_one_is_current(stores: Stores, new_result: NewRe
     assert (
         stores.corrections.current("U-1", "thermal") == chosen_again == replace(new, decisions=chosen_again.decisions)
     )
+
+
+def test_a_persons_choice_stands_until_it_is_given_back_rejected_or_expires(
+    stores: Stores, new_result: NewResult, new_job: Callable[..., Job]
+) -> None:
+    def passed(seed: int) -> StoredCorrection:
+        """The correction of a job that passed, as its own result."""
+        job = stores.jobs.add(new_job(state=JobState.RUNNING))
+        result = stores.results.add(new_result(job_id=job.id), corrections=[thermal(seed)])
+        stores.jobs.transition(
+            job.id, JobState.SUCCEEDED, at=wall_clock.now(), verdict=result.verdict, result_id=result.id
+        )
+        return next(c for c in stores.corrections.list("U-1").items if c.result_id == result.id)
+
+    with pytest.raises(CorrectionRefused, match="no job that passed has given unit U-1 a usable correction"):
+        stores.corrections.choose_by_rule("U-1", "thermal", ANN)
+    old = passed(1)
+    assert (old.current, old.by_rule, old.of_job) == (True, True, True)
+    chosen = stores.corrections.make_current("U-1", old.id, ANN)
+    assert (chosen.current, chosen.by_rule) == (True, False)
+    newer = passed(2)
+    assert not newer.current, "Ann's choice stands"
+    assert "one that a person chose stands" in newer.why_not_current
+    back = stores.corrections.choose_by_rule("U-1", "thermal", Decider("Bo", "the new cycle is better"))
+    assert (back.id, back.current, back.by_rule) == (newer.id, True, True)
+    assert [(d.act, d.by) for d in back.decisions] == [(Act.GIVEN_BACK, "Bo")]
+    assert passed(3).current, "the rule takes the newest again"
+    stores.corrections.make_current("U-1", old.id, ANN)
+    stores.corrections.reject("U-1", old.id, ANN)
+    assert passed(4).current, "a rejected one does not stand"
 
 
 def test_of_many_choices_at_once_one_stands(stores: Stores, new_result: NewResult) -> None:

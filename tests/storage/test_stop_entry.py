@@ -72,6 +72,8 @@ def test_a_failure_in_the_middle_of_an_entry_loses_nothing(stores: Stores, runni
     assert entry(stores).enter("sim", word) == running.id
     assert [stop.id for stop in stores.benches.standing_stops("sim")] == [word.id]
     assert stores.jobs.get(running.id).cancel_requested
+    (note,) = (event.data for event in stores.jobs.events(running.id) if event.data.get("cancel_requested"))
+    assert (note["by"], note["reason"]) == ("Olena", "stop of bench sim: smoke")
     (late,) = noted(stores)
     assert late.detail["stop"] == word.id
     assert late.detail["late_s"] >= LATE.total_seconds()

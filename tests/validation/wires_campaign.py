@@ -45,7 +45,8 @@ PARAMETERS: dict[str, dict[str, Any]] = {
 }
 
 
-async def _acquired(bench: Bench, procedure: Any, stations: Sequence[Station]) -> list[MemoryRecording]:
+async def acquired(bench: Bench, procedure: Any, stations: Sequence[Station]) -> list[MemoryRecording]:
+    """Recordings of a procedure's stations, held in memory; the bench is safe afterwards."""
     made: list[MemoryRecording] = []
     async for stream in procedure.acquire(bench, stations):
         raw = np.concatenate([block async for block in stream.blocks])
@@ -68,7 +69,7 @@ def _results(open_bench: Any, description: BenchDescription, told: Any) -> dict[
         params = procedure.resolve(procedure.params.model_validate(given), context)
         begun_s, bench = monotonic_s(), open_bench()
         try:
-            recordings = asyncio.run(_acquired(bench, procedure, procedure.schedule(params)))
+            recordings = asyncio.run(acquired(bench, procedure, procedure.schedule(params)))
         finally:
             bench.close()
         found[name] = procedure.analyse(recordings, params, context)

@@ -23,7 +23,7 @@ LOG_IN_PAGE = "/log-in"
 
 
 async def authorised(request: Request) -> None:
-    """Dependency of every route. Raises `AccessRefused`."""
+    """Dependency of every route: checks that the sender has the right that the route needs. Raises `AccessRefused`."""
     authorise(request.scope)
 
 
@@ -76,7 +76,9 @@ def _check_csrf(identity: Identity, method: str, headers: Headers) -> None:
 
 
 class Guarded:
-    """ASGI middleware that decides before a body is read, and ends a stream of events once its sender's right ends."""
+    """ASGI middleware that checks the sender's right before a body is read, and ends a stream of events once that right
+    ends.
+    """
 
     def __init__(self, app: ASGIApp, access: AccessService) -> None:
         self._app = app

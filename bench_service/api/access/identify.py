@@ -39,7 +39,7 @@ FOUND = "bench.access"
 
 @dataclass(frozen=True)
 class Found:
-    """The outcome of identification."""
+    """Identification of a request: its identity, or the reason why it has none, and whether it comes from this host."""
 
     local: bool
     """True where the request comes from this host."""
@@ -53,25 +53,27 @@ class Found:
 
     @property
     def proven_name(self) -> str | None:
-        """The name that is proved, also by a session that has ended."""
+        """Name that the request has proved, also by a session that has ended; None where it proved none."""
         identity = self.identity or self.stopper
         return None if identity is None else identity.proven_name
 
     def name(self, claimed: str | None) -> str | None:
-        """The name that counts: the proved one; where nobody logs in the one that a client gives itself."""
+        """Return the name under which a request acts: the proved one; where nobody logs in, the one that a client gives
+        itself.
+        """
         return self.proven_name or (claimed if self.claims else None)
 
 
 @dataclass(frozen=True)
 class Proxies:
-    """Proxies that authenticate people, and the header in which they name them."""
+    """Rule that says which addresses are proxies that authenticate people, and the header in which they name them."""
 
     header: str | None = None
     networks: tuple[IPv4Network | IPv6Network, ...] = ()
 
     @classmethod
     def of(cls, settings: Settings) -> "Proxies":
-        """Build the rule from the settings."""
+        """Return the rule that the settings state."""
         return cls(settings.proxy_user_header, tuple(ip_network(one) for one in settings.proxy_addresses))
 
     def trusted(self, peer: str | None) -> bool:
@@ -84,7 +86,7 @@ class Proxies:
 
 
 class Identification:
-    """The rules by which a request's sender is known."""
+    """Rules by which the sender of a request is identified, from the accounts, tokens and sessions in memory."""
 
     def __init__(self, door: Door, book: AccessBook, proxies: Proxies) -> None:
         self._door = door
@@ -161,22 +163,22 @@ class Identification:
         return Found(local, stopper=stopper, refusal=Refusal(401, "NotLoggedIn", text, account.name))
 
     def has_credential(self, headers: Headers) -> bool:
-        """Return whether a request states anything about its sender that another look may find."""
+        """Return whether a request has a credential that may be found after accounts and tokens are read again."""
         by_proxy = self._proxies.header is not None and self._proxies.header in headers
         return by_proxy or "authorization" in headers or cookie_of(headers) is not None
 
     @property
     def log_in_on(self) -> bool:
-        """Return whether people log in."""
+        """True where people must log in, which is so once there is an account."""
         return self._book.log_in_on
 
     async def look_again(self) -> None:
-        """Have accounts and tokens read again, for a short time at the most."""
+        """Have accounts and tokens read from the database again, and wait for it for a short time at the most."""
         await asyncio.wait((asyncio.wrap_future(self._book.refreshed()),), timeout=LOOK_AGAIN_S)
 
 
 class Identified:
-    """ASGI middleware that finds out who sends a request; whether it may is decided at its route."""
+    """ASGI middleware that identifies the sender of each request; the right is checked at the route."""
 
     def __init__(self, app: ASGIApp, rules: Identification) -> None:
         self._app = app
@@ -223,7 +225,7 @@ def found_of(scope: Scope) -> Found:
 
 
 def cookie_of(headers: Headers) -> str | None:
-    """The secret in the log-in's cookie; None where there is none."""
+    """Return the secret in the log-in's cookie; None where there is none."""
     cookies = cookie_parser(headers.get("cookie", ""))
     return cookies.get(SECURE_COOKIE) or cookies.get(COOKIE)
 

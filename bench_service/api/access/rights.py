@@ -55,6 +55,7 @@ RIGHTS: dict[str, Right] = {
     "describe_file": Right.ENGINEER,
     "declare_unit": Right.ENGINEER,
     "choose_correction": Right.ENGINEER,
+    "choose_correction_by_rule": Right.ENGINEER,
     "approve_correction": Right.ENGINEER,
     "reject_correction": Right.ENGINEER,
     "enter_calibration": Right.ENGINEER,
@@ -89,5 +90,7 @@ RIGHTS: dict[str, Right] = {
 
 
 def right_of(name: str, method: str) -> Right:
-    """The right that a route needs."""
+    """Return the right that a route needs, by its name; one that is not listed needs `SEE` for reading, `ADMIN` for
+    anything else.
+    """
     return RIGHTS.get(name, Right.SEE if method in READING else Right.ADMIN)

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from anyio import CapacityLimiter, to_thread
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import Path, Request, Response
 from starlette.datastructures import Headers
 
 from bench_service.access.credentials import LONGEST, digest_of
@@ -25,8 +25,9 @@ from bench_service.api.access.schemas import (
 from bench_service.api.http.dependencies import Me, RequestedBy, Service
 from bench_service.api.http.errors import problems
 from bench_service.mapping import copied
+from bench_service.routing import Routes
 
-router = APIRouter(prefix="/api/v1", tags=["access"])
+router = Routes(prefix="/api/v1", tags=["access"])
 LOG_INS = CapacityLimiter(4)
 """Threads of log-ins: they wait for one another, and take none from other requests."""
 AccountName = Annotated[str, Path(max_length=64)]

@@ -1,6 +1,5 @@
 """Routes of benches: descriptions, current state, queues and software stops."""
 
-from fastapi import APIRouter
 from fastapi.exceptions import RequestValidationError
 
 from bench_service.api.access.teams import TeamOfBench
@@ -29,14 +28,15 @@ from bench_service.api.http.dependencies import (
 )
 from bench_service.api.http.errors import problems
 from bench_service.model.records import reasons_of
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from bench_service.wall_clock import now
 
-router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
+router = Routes(prefix="/api/v1/benches", tags=["benches"])
 
 
 def view_of(service: BenchService, bench_id: str) -> BenchView:
-    """Build the view of a bench: what it is, what it does, how safe it is. Raises `NotFound`."""
+    """Return the view of a bench: description, live state, safety, running job, queue. Raises `NotFound`."""
     description = service.benches.description(bench_id)
     running = service.jobs.driving_job(bench_id)
     live = service.live.of_bench(bench_id)
@@ -99,8 +99,8 @@ async def stop(
 
     The stop goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its
     place the bench's supervisor. The database follows when it can; `books` says why where it has not yet. Several stops
-    of a bench can stand at the same time, sixteen at most: of one more, `books` says that it waits. Sent again with its
-    Idempotency-Key it is the same stop, as long as this process lives.
+    of a bench can stand at the same time, sixteen at most: of one more, `books` says that it waits. Sent again within
+    ten minutes with its Idempotency-Key it is the same stop, as long as this process lives.
     """
     asked = body or StopRequest.model_validate({})
     by = sender.name(asked.by) or client

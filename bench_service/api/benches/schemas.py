@@ -57,7 +57,7 @@ class StopView(BaseModel):
 
 
 class StopPage(BaseModel):
-    """Stops of a bench, newest first, with those that were released."""
+    """One page of a bench's stops, newest first, with those that were released."""
 
     items: list[StopView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
@@ -104,7 +104,7 @@ class DevicesView(BaseModel):
 class SafetyView(BaseModel):
     """The known safety of a bench. Software is not the emergency stop: that is a separate circuit at the table."""
 
-    safe: bool | None = Field(description="Table at rest, unit off, chamber led to ambient; null: not known here")
+    safe: bool | None = Field(description="Table at rest, unit off, chamber commanded to ambient; null: not known here")
     explanation: str = Field(description="State of the devices as a sentence, with the process that handles it")
     devices: DevicesView | None = Field(description="null: they are on another host")
     worker: str | None = Field(description="The process of this host that drives the bench")

@@ -18,7 +18,9 @@ _waiting = 0
 async def stop_in_own_thread(
     stops: StopService, bench_id: str, reason: str, by: str, key: str | None = None, *, wait: bool = True
 ) -> Stopped:
-    """Run `StopService.stop` in a thread of its own, outside the pool of all other routes. Raises what it raises."""
+    """Run `StopService.stop` in a thread of its own, outside the pool of all other routes, and return its outcome.
+    Raises what it raises, and `StorageFailure` where no thread can be made.
+    """
     global _waiting
     _waiting += 1
     try:

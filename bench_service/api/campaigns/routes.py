@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import Path, Query, Response
 from pydantic import Field
 
 from bench_service.api.access.teams import TeamOfCampaign, TeamOfRun
@@ -25,9 +25,10 @@ from bench_service.campaigns.lineage import lineage_of
 from bench_service.campaigns.run import RunRequest
 from bench_service.mapping import copied
 from bench_service.model.job import JobState
+from bench_service.routing import Routes
 from procedures.core.errors import BadParameter
 
-router = APIRouter(prefix="/api/v1", tags=["campaigns"])
+router = Routes(prefix="/api/v1", tags=["campaigns"])
 CampaignName = Annotated[str, Path(pattern=CAMPAIGN_NAME)]
 OF_A_RUN = ("read_campaign_run", "cancel_campaign_run", "report_campaign_run")
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import Response
 from pydantic import Field
 
 from bench_service.api.access.teams import TeamOfSchedule
@@ -13,13 +13,14 @@ from bench_service.api.http.fields import NAME, Labels, Request
 from bench_service.campaigns.schedule import Missed, Overlap
 from bench_service.campaigns.scheduler import ScheduleRequest
 from bench_service.mapping import copied
+from bench_service.routing import Routes
 
-router = APIRouter(prefix="/api/v1/schedules", tags=["campaigns"])
+router = Routes(prefix="/api/v1/schedules", tags=["campaigns"])
 OF_A_SCHEDULE = ("read_schedule", "change_schedule", "remove_schedule")
 
 
 class ScheduleSubmission(Request):
-    """Request to run a campaign on a unit at repeated times."""
+    """Request to run a campaign on a unit at repeated times, or once."""
 
     cron: str = Field(
         min_length=1,
@@ -41,6 +42,7 @@ class ScheduleSubmission(Request):
         300.0, ge=1.0, le=604_800.0, allow_inf_nan=False, description="Delay after which a start counts as missed [s]"
     )
     overlap: Overlap = Field(Overlap.SKIP, description="Start while the previous run is open: skip or queue")
+    once: bool = Field(False, description="Whether the next start is the only one: then it is switched off")
     enabled: bool = True
     labels: Labels = Field(default_factory=Labels, max_length=20)
 

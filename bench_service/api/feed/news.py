@@ -19,14 +19,14 @@ PAGE = 200
 
 
 def frame(event: str, data: str | bytes) -> bytes:
-    """Encode a server-sent event."""
+    """Return a server-sent event with a name and its data, as bytes."""
     text = data.encode() if isinstance(data, str) else data
     return b"event: " + event.encode() + b"\ndata: " + text + b"\n\n"
 
 
 @dataclass
 class News:
-    """The last look at the benches."""
+    """The state of all benches at the last reading, and the trouble if the database did not answer."""
 
     benches: dict[str, bytes] = field(default_factory=dict[str, bytes])
     """Frame of each bench."""
@@ -36,7 +36,9 @@ class News:
 
 
 class NewsReader:
-    """Reads the benches at most every `LOOK_S`, whatever the number of listeners."""
+    """Reads the state of all benches for the listeners of this process, at most every `LOOK_S`, whatever their
+    number.
+    """
 
     def __init__(self, service: BenchService) -> None:
         self._service = service
@@ -72,7 +74,7 @@ class NewsReader:
         return frame("bench", BenchNews(bench=view, job=shown).model_dump_json())
 
     def live(self, bench_id: str, known: News) -> BenchLive | None:
-        """The newest live state: of the own bench from memory, of others from the last look."""
+        """Return the newest live state of a bench: of the own bench from memory, of others from the last reading."""
         own = self._service.live
         return own.said() if bench_id == own.own else known.lives.get(bench_id)
 
@@ -89,5 +91,5 @@ class NewsReader:
 
 
 def live_frame(live: BenchLive) -> bytes:
-    """Encode a bench's live state as a frame."""
+    """Return a bench's live state as the bytes of a server-sent event."""
     return frame("live", LIVE.dump_json(live))

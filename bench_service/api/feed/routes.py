@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from fastapi.responses import StreamingResponse
 
 from bench_service.api.feed.news import NewsReader, frame, live_frame
@@ -11,9 +11,10 @@ from bench_service.api.feed.schemas import Beat
 from bench_service.api.http.errors import problems
 from bench_service.api.jobs.event_stream import HEAD, HEADERS
 from bench_service.bench.live.values import BenchLive
+from bench_service.routing import Routes
 from bench_service.wall_clock import monotonic_s, now, pause_async
 
-router = APIRouter(prefix="/api/v1/feed", tags=["benches"])
+router = Routes(prefix="/api/v1/feed", tags=["benches"])
 
 TICK_S = 0.1
 """Interval in which a listener gets the newest live state, where it changed [s]."""

@@ -26,7 +26,9 @@ _waiting = 0
 
 
 async def place_in_turn(places: Places, wanted_bytes: int) -> Callable[[], None]:
-    """Take a place, see `Places.take`; wait for one where others have them all. Raises `Overloaded`."""
+    """Wait for a place where others have them all, and return the function that gives it back, see `Places.take`.
+    Raises `Overloaded`.
+    """
     global _waiting
     deadline = monotonic_s() + WAIT_S
     _waiting += 1
@@ -43,7 +45,7 @@ async def place_in_turn(places: Places, wanted_bytes: int) -> Callable[[], None]
 
 
 class AdmittedStream(StreamingResponse):
-    """A stream that gives its place back at its end, however it ends; a client that stalls is let go."""
+    """A streaming response that gives its place back at its end, however it ends; a client that stalls is cut off."""
 
     give_back: Callable[[], None] = staticmethod(lambda: None)
 

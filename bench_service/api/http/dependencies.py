@@ -50,7 +50,9 @@ By = Annotated[
 
 
 def as_utf8(text: str | None) -> str | None:
-    """Read a header as the UTF-8 that browsers send; one that is none stays as it came (ISO 8859-1)."""
+    """Return a header's text as the UTF-8 that browsers send; a text that is not UTF-8 stays as it came (ISO
+    8859-1).
+    """
     try:
         return None if text is None else text.encode("latin-1").decode("utf-8")
     except (UnicodeEncodeError, UnicodeDecodeError):

@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Door:
-    """Access rules of one service."""
+    """Access rules of one service: accepted hosts, the token, and whether every peer is local."""
 
     hosts: frozenset[str]
     """Names in `Host` that belong to this service; with a port only that port, without one any."""
@@ -49,7 +49,7 @@ class Door:
 
     @classmethod
     def of(cls, settings: Settings, *more_hosts: str) -> "Door":
-        """Build the rules from the settings. Raises `Misconfigured` for a token that cannot be used."""
+        """Return the rules that the settings state. Raises `Misconfigured` for a token that cannot be used."""
         own = () if settings.host in ANY_ADDRESS else (_bracketed(settings.host),)
         try:
             token = settings.token()
@@ -88,7 +88,7 @@ class Door:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Reason for which a request is refused."""
+    """Reason for which a request is refused: status code, kind and sentence."""
 
     status: int
     kind: str
@@ -98,7 +98,9 @@ class Refusal:
 
 
 class Doorkeeper:
-    """ASGI middleware that enforces the access rules: a refused request reaches no route, and its body is not read."""
+    """ASGI middleware that applies the access rules of `Door`: a refused request reaches no route, and its body is not
+    read.
+    """
 
     def __init__(self, app: ASGIApp, door: Door) -> None:
         self._app = app

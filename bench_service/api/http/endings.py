@@ -9,14 +9,16 @@ from bench_service.api.http.errors import respond
 
 
 def install(app: FastAPI) -> None:
-    """Refuse addresses that nothing can hold, and answer requests that are still at work at the end."""
+    """Add to an application the refusal of addresses with NUL, and the answer to requests still at work at the end."""
     app.add_middleware(RefuseNul)
     app.add_middleware(AnswerAtTheEnd)
 
 
 class AnswerAtTheEnd:
-    """Middleware that answers every request still at work when the server's grace period is over. Such a request may be
-    repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out. A stream ends, unfinished.
+    """ASGI middleware that answers every request still at work when the server's grace period is over.
+
+    Such a request may be repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out. A
+    stream ends, unfinished.
     """
 
     def __init__(self, app: ASGIApp) -> None:

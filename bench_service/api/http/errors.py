@@ -1,4 +1,4 @@
-"""One table from errors to status codes, and problem+json (RFC 9457) for all of them."""
+"""Error handlers: every error answers with a problem document (RFC 9457); status codes: `api/http/status.py`."""
 
 from collections.abc import Sequence
 from http import HTTPStatus
@@ -58,13 +58,17 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 def binary(media_type: str) -> dict[str, Any]:
-    """The `content` of an answer of bytes. It is sent as `media_type`; generators of clients know the second name."""
+    """Return the OpenAPI `content` of an answer of bytes. It is sent as `media_type`; generators of clients know the
+    second name.
+    """
     schema = {"schema": {"type": "string", "format": "binary"}}
     return {media_type: schema, "application/octet-stream": schema}
 
 
 def made(status: int, parameter: str, *operations: str) -> dict[int | str, dict[str, Any]]:
-    """The good answer of a create, with OpenAPI links from the new thing's id to the operations that take it."""
+    """Return the OpenAPI description of a create's good answer, with links from the new thing's id to the operations
+    that take it.
+    """
     link = {
         operation: {"operationId": operation, "parameters": {parameter: "$response.body#/id"}}
         for operation in operations
@@ -73,7 +77,8 @@ def made(status: int, parameter: str, *operations: str) -> dict[int | str, dict[
 
 
 def install(app: FastAPI) -> None:
-    """Answer every error of the table, of validation and of routing with a problem document.
+    """Add to an application the handlers that answer every known error, of validation and routing too, with a problem
+    document.
 
     Every handler is asynchronous: another one would wait for a thread of the pool, and a stop's refusal with it.
     """
@@ -171,7 +176,7 @@ async def _on_unknown(request: Request, error: Exception) -> Response:
 def respond(
     request: Request, status: int, detail: str, kind: str, errors: Sequence[FieldError] = (), lost: Sequence[str] = ()
 ) -> JSONResponse:
-    """Build the response that carries a problem document."""
+    """Return the response that carries a problem document with this status."""
     return _answer(_problem(request, status, detail, kind, errors, lost))
 
 

@@ -21,12 +21,12 @@ SECURITY_HEADERS = {
 
 
 def quoted(path: str) -> str:
-    """Quote a path of this service as the value of another address's parameter."""
+    """Return a path of this service quoted as the value of a parameter of another address."""
     return quote(path, safe="/")
 
 
 class SecurityHeaders:
-    """ASGI middleware that adds the security headers that an answer does not have of its own."""
+    """ASGI middleware that adds each security header that an answer does not have of its own."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

@@ -13,6 +13,6 @@ PDF: dict[int | str, dict[str, object]] = {
 
 
 def printed(data: bytes, name: str) -> Response:
-    """Answer with a PDF that a browser shows, and saves under a name."""
+    """Return the response with a PDF that a browser shows, and saves under a name."""
     headers = {"Content-Disposition": f'inline; filename="{name}"', "Cache-Control": "no-cache"}
     return Response(data, media_type="application/pdf", headers=headers)

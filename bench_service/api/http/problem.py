@@ -11,7 +11,7 @@ Shown = Annotated[str, BeforeValidator(shown)]
 
 
 class FieldError(BaseModel):
-    """A faulty field of a request."""
+    """A faulty field of a request: its path, what is wrong, and the value that was sent."""
 
     field: Shown = Field(description="Path of the field, for example parameters.dwell_s")
     message: Shown = Field(description="What is wrong, with the allowed range and the way out")

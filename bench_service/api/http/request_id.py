@@ -14,7 +14,7 @@ ACCEPTED = re.compile(r"[A-Za-z0-9._:/+=@-]{1,100}")
 
 
 class RequestId:
-    """ASGI middleware that gives each request an id; it never delays a stream."""
+    """ASGI middleware that gives each request an id, for the answer's header and the log; it never delays a stream."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

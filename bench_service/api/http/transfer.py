@@ -16,7 +16,7 @@ AS_THEY_ARE = (*DEFAULT_EXCLUDED_CONTENT_TYPES, *(form.media_type for form in Ex
 
 
 def install(app: FastAPI) -> None:
-    """Answer HEAD wherever GET is answered, and compress texts."""
+    """Add to an application the answer to HEAD wherever GET is answered, and the compression of texts."""
     app.add_middleware(HeadOfGet)
     app.add_middleware(GZipMiddleware, minimum_size=LEAST_BYTES, compresslevel=LEVEL, exclude_content_types=AS_THEY_ARE)
 

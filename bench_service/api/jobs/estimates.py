@@ -1,13 +1,12 @@
 """Route of a job's estimates so far: Allan deviation and bias of the dwell, coefficients after each station."""
 
-from fastapi import APIRouter
-
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
 from bench_service.api.http.job_numbers import JobByNumber
 from bench_service.evidence.so_far.documents import JobEstimates
+from bench_service.routing import Routes
 
-router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"], dependencies=[JobByNumber])
+router = Routes(prefix="/api/v1/jobs", tags=["jobs"], dependencies=[JobByNumber])
 
 
 @router.get("/{job_id}/estimates", responses=problems(404))

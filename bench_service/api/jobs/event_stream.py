@@ -29,18 +29,18 @@ DOCUMENTED: dict[int | str, dict[str, object]] = {
 
 
 class ServerSentEvents:
-    """Frames in the format of server-sent events; implements `bench_service.jobs.events.hub.Frames`."""
+    """Format of a job's events as server-sent events. Implements `bench_service.jobs.events.hub.Frames`."""
 
     quiet = b": still here\n\n"
     dropped = b": too slow, and let go; come back with Last-Event-ID\n\n"
 
     def event(self, event: Event) -> bytes:
-        """Encode an event with its sequence as id."""
+        """Return an event as the bytes of a server-sent event, with its sequence as id."""
         data = EventView.of(event).model_dump_json()
         return f"id: {event.sequence}\nevent: {event.kind}\ndata: {data}\n\n".encode()
 
     def live(self, live: BenchLive) -> bytes:
-        """Encode the bench's current activity as a frame."""
+        """Return the bench's current activity as the bytes of a server-sent event, without id."""
         return b"event: live\ndata: " + LIVE.dump_json(live) + b"\n\n"
 
 

@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import Header, Query, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 
 from bench_service.access.service import require_team
@@ -43,10 +43,11 @@ from bench_service.mapping import copied
 from bench_service.model.errors import NotUnderstood
 from bench_service.model.job import Job, JobState
 from bench_service.model.request import JobRequest
+from bench_service.routing import Routes
 from bench_service.service import BenchService
 from bench_service.wall_clock import now
 
-router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"], dependencies=[JobByNumber])
+router = Routes(prefix="/api/v1/jobs", tags=["jobs"], dependencies=[JobByNumber])
 
 OF_A_JOB = (
     "read_job",

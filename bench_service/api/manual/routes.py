@@ -5,7 +5,7 @@ Live readings come with the bench (`live.manual`, `live.devices`) and over the f
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Response
 
 from bench_service.access.service import require_team
 from bench_service.api.access.teams import TeamOfBench, TeamOfLease
@@ -24,8 +24,9 @@ from bench_service.api.manual.schemas import (
 from bench_service.jobs.manual.service import ManualRequest
 from bench_service.mapping import copied
 from bench_service.model.errors import NotFound
+from bench_service.routing import Routes
 
-router = APIRouter(prefix="/api/v1/benches/{bench_id}/manual", tags=["manual mode"])
+router = Routes(prefix="/api/v1/benches/{bench_id}/manual", tags=["manual mode"])
 
 
 @router.post(

@@ -44,13 +44,15 @@ class _Demand(Request):
 
 
 class Home(_Demand):
-    """All axes to zero. A table whose encoders do not know their zero is homed by a person, at its controller."""
+    """Demand to move all axes to zero. A table whose encoders do not know their zero is homed by a person, at its
+    controller.
+    """
 
     kind: Literal["home"]
 
 
 class GoTo(_Demand):
-    """Axes to angles; one that is left out stays where it stands."""
+    """Demand to move axes to angles; an axis that is left out stays where it stands."""
 
     kind: Literal["go_to"]
     outer_deg: Number | None = None
@@ -59,7 +61,7 @@ class GoTo(_Demand):
 
 
 class Rate(_Demand):
-    """A constant rate of one axis for a stated time, from rest to rest; a halt ends it earlier."""
+    """Demand for a constant rate of one axis for a stated time, from rest to rest; a halt ends it earlier."""
 
     kind: Literal["rate"]
     axis: Literal["outer", "middle", "inner"]
@@ -71,13 +73,13 @@ class Rate(_Demand):
 
 
 class Halt(_Demand):
-    """The table to rest, from a rate or a move."""
+    """Demand to bring the table to rest, from a rate or a move."""
 
     kind: Literal["halt"]
 
 
 class ChamberSetPoint(_Demand):
-    """The chamber's air to a temperature."""
+    """Demand to bring the chamber's air to a temperature, at a rate of change."""
 
     kind: Literal["chamber"]
     temperature_c: Number
@@ -85,7 +87,7 @@ class ChamberSetPoint(_Demand):
 
 
 class SupplyOn(_Demand):
-    """The unit's supply on."""
+    """Demand to switch the unit's supply on."""
 
     kind: Literal["supply_on"]
     voltage_v: Number | None = Field(None, description="null: nominal")
@@ -93,7 +95,7 @@ class SupplyOn(_Demand):
 
 
 class SupplyOff(_Demand):
-    """The unit's supply off."""
+    """Demand to switch the unit's supply off."""
 
     kind: Literal["supply_off"]
 
@@ -133,7 +135,7 @@ class LeasePage(BaseModel):
 
 
 class DemandView(BaseModel):
-    """A demand, and what became of it."""
+    """A demand of manual mode with its state and its answer."""
 
     key: str
     lease: str

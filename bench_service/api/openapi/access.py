@@ -45,7 +45,9 @@ def declare_security(paths: dict[str, Any]) -> None:
 
 
 def security_of(right: Right, method: str) -> list[dict[str, list[str]]]:
-    """The alternatives by which an operation may be authenticated; an empty one: without."""
+    """Return the alternatives by which an operation may be authenticated, as OpenAPI has them; an empty one:
+    without.
+    """
     if right is Right.OPEN:
         return []
     if right is Right.STOP:

@@ -40,7 +40,9 @@ INFO: Schema = {
 
 
 def install(app: FastAPI, catalogue: Callable[[], Catalogue]) -> None:
-    """Serve the completed document. `catalogue` is asked when the document is first wanted: to read it takes long."""
+    """Have an application serve the completed document. `catalogue` is asked when the document is first wanted: to read
+    it takes long.
+    """
     made = app.openapi
 
     def openapi() -> dict[str, Any]:

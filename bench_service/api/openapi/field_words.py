@@ -63,7 +63,9 @@ def describe(schemas: dict[str, Schema]) -> None:
 
 
 def word(schema: str, field: str) -> str:
-    """Meaning of a field by the table: of this schema, of a pattern of schemas, or of the name; else empty."""
+    """Return the meaning of a field by the table `field_words.toml`: of this schema, of a pattern of schemas, or of the
+    name; else empty.
+    """
     table = _table()
     exact = table.get(f"{schema}.{field}")
     if exact is not None:

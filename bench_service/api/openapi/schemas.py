@@ -33,7 +33,7 @@ def camel(name: str) -> str:
 
 
 def renamed(node: Any, names: Mapping[str, str]) -> Any:
-    """Copy a document with every reference to a schema of the components led to that schema's new name."""
+    """Return a copy of a document in which every reference to a schema of the components has that schema's new name."""
     if isinstance(node, dict):
         return {key: _led(key, child, names) for key, child in node.items()}
     return [renamed(child, names) for child in node] if isinstance(node, list) else node
@@ -47,12 +47,14 @@ def _led(key: str, child: Any, names: Mapping[str, str]) -> Any:
 
 
 def component(name: str, schema: Schema) -> Schema:
-    """Copy a schema of the components in the form that generators read, with its name as its only title."""
+    """Return a copy of a schema of the components in the form that generators read, with its name as its only title."""
     return {"title": name, **tidy(schema)}
 
 
 def tidy(schema: Any) -> Any:
-    """Copy a schema without titles, its arrays with `items`, its files as binary; in what it contains too."""
+    """Return a copy of a schema without titles, its arrays with `items`, its files as binary; in what it contains
+    too.
+    """
     if isinstance(schema, list):
         return [tidy(one) for one in schema]
     if not isinstance(schema, dict):

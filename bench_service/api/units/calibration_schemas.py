@@ -55,7 +55,7 @@ class CalibrationEntry(Request):
     remark: Remark = ""
 
     def entry(self) -> Entry:
-        """Convert to what the evidence room takes."""
+        """Return the entry in the form that `evidence.entered_calibrations` takes."""
         return copied(
             Entry,
             self,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Path, Query, Response
+from fastapi import Depends, Path, Query, Response
 from pydantic import Field
 
 from bench_service.api.http.dependencies import After, ClientName, IdempotencyKey, Limit, ProvenName, Service
@@ -27,9 +27,10 @@ from bench_service.formats.calibration_exports.forms import MEDIA_TYPES, Calibra
 from bench_service.model.calibrations import Decider
 from bench_service.model.errors import NotFound
 from bench_service.model.records import Idempotency
+from bench_service.routing import Routes
 from procedures.core.unit import SERIAL
 
-router = APIRouter(prefix="/api/v1/units/{serial}/calibrations", tags=["units"])
+router = Routes(prefix="/api/v1/units/{serial}/calibrations", tags=["units"])
 Serial = Annotated[str, Path(pattern=SERIAL)]
 
 

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Path
+from fastapi import Path
 from pydantic import BaseModel, Field
 
 from bench_service.api.http.dependencies import After, ClientName, IdempotencyKey, Limit, ProvenName, Service
@@ -12,10 +12,11 @@ from bench_service.api.http.fields import NAME, Request
 from bench_service.mapping import copied
 from bench_service.model.notes import UnitNote
 from bench_service.model.records import Idempotency
+from bench_service.routing import Routes
 from bench_service.wall_clock import new_id, now
 from procedures.core.unit import SERIAL
 
-router = APIRouter(prefix="/api/v1/units/{serial}/notes", tags=["units"])
+router = Routes(prefix="/api/v1/units/{serial}/notes", tags=["units"])
 Serial = Annotated[str, Path(pattern=SERIAL)]
 
 

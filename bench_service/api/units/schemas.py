@@ -12,6 +12,7 @@ from bench_service.mapping import copied
 from bench_service.model.calibrations import Approval
 from bench_service.wall_clock import now
 from procedures.core.converter import ConverterTriad
+from procedures.core.limits import Verdict
 from procedures.core.recording import Channel
 from procedures.core.temperature.gyros import GyroThermalCorrection
 from procedures.core.temperature.thermometers import ThermometerCorrection
@@ -71,8 +72,11 @@ class CorrectionView(BaseModel):
     unit: str
     kind: CorrectionKind
     result: str
+    verdict: Verdict = Field(description="Verdict of the result that gave it")
     made_at: datetime
     current: bool
+    by_rule: bool = Field(description="Whether the rule made it current, not a person; false while it is not current")
+    not_current: str = Field(description="Why it is not current, and the way out; empty where it is")
     simulated: bool
     thermal: ThermalCorrection | None = Field(description="Thesis 4.1, of the kind `thermal`; else null")
     converter: ConverterTriad | None = Field(description="Models of x, y, z, of the kind `converter`; else null")
@@ -91,6 +95,7 @@ class CorrectionView(BaseModel):
             stored,
             stored.correction,
             result=stored.result_id,
+            not_current=stored.why_not_current,
             unusable=stored.unusable(now()),
             decisions=[DecisionView.of(d) for d in stored.decisions],
             results=results,
@@ -102,6 +107,12 @@ class CorrectionChoice(Request):
 
     by: Annotated[str, NAME] | None = Field(None, description="Person who decides; null: the client's name")
     remark: Remark = Field("", description="Needed for a correction of a result that did not pass")
+
+
+class CorrectionRuleChoice(CorrectionChoice):
+    """Request to give a kind of correction back to the rule."""
+
+    kind: CorrectionKind = Field(description="Kind whose newest usable correction by a job that passed is to count")
 
 
 class CorrectionPage(BaseModel):

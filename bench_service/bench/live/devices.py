@@ -7,14 +7,18 @@ from procedures.bench.device import Status
 
 
 class DeviceReadings:
-    """Readings of table, supply and chamber of one bench; commands nothing."""
+    """Reads table, supply and chamber of one bench for its live state, and keeps since when each status word is as it
+    is. Commands nothing.
+    """
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._status: dict[tuple[str, str], LiveStatus] = {}
 
     async def read(self) -> LiveDevices:
-        """Read the devices. Raises `BenchError`."""
+        """Read table, supply and chamber once: encoder angles, voltage and current, temperature, status words. Raises
+        `BenchError`.
+        """
         bench = self._bench
         table, supply = await bench.turntable.read(), await bench.supply.read()
         chamber = None if bench.chamber is None else await bench.chamber.read()

@@ -32,7 +32,9 @@ STRETCHES = 10
 
 
 class LiveTap:
-    """Collects and publishes the live state of one job's session."""
+    """Collects the progress, device readings and last samples of one job's session, and publishes them to the
+    `LiveBoard`. Used by the bench's own thread.
+    """
 
     def __init__(self, job: Job, bench: Bench, board: LiveBoard) -> None:
         self._job = job
@@ -49,17 +51,21 @@ class LiveTap:
         self._stretches: deque[tuple[float, float, Array]] = deque(maxlen=STRETCHES)
 
     def station(self, index: int) -> None:
-        """Note that the session begins with a station."""
+        """Note that the station with this index (from 0) begins now, for the progress of the job."""
         self._index = index
         self._station_begun_s = self._bench.clock.now_s()
 
     def stream(self, stream: Stream) -> None:
-        """Note that a recording begins."""
+        """Note that a recording begins: its channels and rate replace those before, and the kept samples are
+        dropped.
+        """
         self._channels, self._rate_hz = stream.channels, stream.rate_hz
         self._stretches.clear()
 
     def block(self, start_s: float, block: RawArray) -> None:
-        """Take in stored samples, shape (n, channels); `start_s` is the bench time of the first one's beginning."""
+        """Take in stored samples, shape (n, channels), of which a few are kept for the plot; `start_s` is the bench
+        time of the first one's beginning.
+        """
         looked_at_s = monotonic_s()
         if looked_at_s - self._looked_at_s < LOOK_S or len(block) == 0:
             return

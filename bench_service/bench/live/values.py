@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class LiveStatus:
-    """A status word of a device, and since when it is as it is."""
+    """A status word of a device, and since when it has had this value."""
 
     device: str
     name: str
@@ -43,7 +43,7 @@ class LiveStatus:
 
 @dataclass(frozen=True)
 class LiveDevices:
-    """The state that the devices report; angles are those of the encoders."""
+    """The state that the devices report: encoder angles, supply, chamber, status words."""
 
     outer_deg: float
     middle_deg: float
@@ -65,7 +65,7 @@ class LiveDevices:
 
 @dataclass(frozen=True)
 class LiveChannel:
-    """A channel in nominal rate units, one number for each stretch of `LiveSamples`."""
+    """A channel's minimum, mean and maximum in nominal rate units, one number for each stretch of `LiveSamples`."""
 
     name: str
     unit: str
@@ -116,7 +116,9 @@ class LiveSensor:
 
 @dataclass(frozen=True)
 class LiveManual:
-    """Manual mode of the bench."""
+    """State of manual mode on the bench: the lease and its holder, what is being carried out, and the unit's
+    sensors.
+    """
 
     lease: str
     holder: str
@@ -136,7 +138,9 @@ class LiveManual:
 
 @dataclass(frozen=True)
 class BenchLive:
-    """The newest live state of a bench, as its driver wrote it."""
+    """The newest live state of a bench, as its driver wrote it: process, job, devices, samples, manual mode. Also the
+    driver's heartbeat.
+    """
 
     bench: str
     at: datetime
@@ -152,7 +156,7 @@ class BenchLive:
     """Manual mode; None: the bench is not in it."""
 
     def seen_s(self, at: datetime) -> float:
-        """Age of this state [s]."""
+        """Age of this state at a moment [s]; 0 for a state with a later time."""
         return max(0.0, (at - self.at).total_seconds())
 
     def there(self, at: datetime) -> bool:
@@ -165,7 +169,7 @@ class BenchLive:
 
 
 class LiveStore(Protocol):
-    """PORT of memory: one live state per bench."""
+    """Store of the live states, one row a bench, which each write replaces. Interface; the SQL is in `persistence`."""
 
     def put(self, live: BenchLive) -> None:
         """Replace the bench's live state. Raises `StorageFull`, `StorageFailure`."""
@@ -174,7 +178,9 @@ class LiveStore(Protocol):
     def get(self, bench_id: str) -> BenchLive | None: ...
 
     def all(self) -> tuple[BenchLive, ...]:
-        """The live states of all benches that ever had a driver, by name."""
+        """Return the live states of all benches that ever had a driver, in order of their names. Raises
+        `StorageFailure`.
+        """
         ...
 
 
@@ -195,7 +201,7 @@ class LiveBoard:
         self.news.set()
 
     def said(self) -> BenchLive | None:
-        """The newest live state of the own bench."""
+        """Return the newest live state of the own bench from memory; None before the first one."""
         return self._said
 
     def of_bench(self, bench_id: str) -> BenchLive | None:
@@ -205,7 +211,7 @@ class LiveBoard:
         return self._store.get(bench_id)
 
     def all(self) -> tuple[BenchLive, ...]:
-        """The newest live states of all benches."""
+        """Return the newest live states of all benches, the own bench first. Raises `StorageFailure`."""
         others = (live for live in self._store.all() if live.bench != self.own)
         mine = () if self.own is None else (self.of_bench(self.own),)
         return tuple(live for live in (*mine, *others) if live is not None)
@@ -235,7 +241,7 @@ class Heartbeat:
         self._thread.start()
 
     def end(self) -> None:
-        """Stop the thread, and write a last state: the bench has no driver."""
+        """Stop the thread and wait for it, then write a last state: the bench has no driver."""
         self._ending.set()
         self._board.news.set()
         self._thread.join()

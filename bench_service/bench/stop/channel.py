@@ -23,12 +23,12 @@ from typing import Any
 from bench_service.bench.records_in_place import (
     RECORD_BYTES,
     Unreadable,
-    decoded,
     encoded,
     preallocate,
     read_record,
     write_record,
 )
+from bench_service.bench.stop.channel_records import document_in, words_in
 from bench_service.bench.stop.folder_sockets import bound, send
 from bench_service.bench.stop.word import DAMAGED, StopAnswer, StopWord
 from bench_service.wall_clock import monotonic_s, pause
@@ -45,7 +45,9 @@ log = logging.getLogger(__name__)
 
 
 class StopChannel:
-    """The channel of one bench on its host. Every verb is bounded by the file system's own time."""
+    """The stop channel of one bench on its host: the file with its stop requests and answers, and the sockets that wake
+    its readers. Every verb is bounded by the file system's own time.
+    """
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self.bench_id = bench_id
@@ -75,7 +77,7 @@ class StopChannel:
             os.close(file)
 
     def ask(self, word: StopWord) -> bool:
-        """Enter a stop request; True where worker or supervisor will see it. Raises nothing."""
+        """Enter a stop request; return True where worker or supervisor will see it. Raises nothing."""
         written = False
         with suppress(OSError):
             written = self._write(word)
@@ -83,11 +85,13 @@ class StopChannel:
         return written or sent
 
     def wake(self) -> bool:
-        """Wake the bench's worker: there may be something to do. True where a worker listens."""
+        """Wake the bench's worker, so that it looks into its queue; return True where a worker listens."""
         return self._send({"wake": True}, (WORKER,))
 
     def standing(self) -> tuple[StopWord, ...]:
-        """The stop requests not yet released, oldest first. Raises nothing: an unreadable record stops the bench."""
+        """Return the stop requests not yet released, oldest first. Raises nothing: an unreadable record stops the
+        bench.
+        """
         try:
             found = self._read()
         except FileNotFoundError:
@@ -100,11 +104,11 @@ class StopChannel:
         return tuple(sorted((*found, *came), key=lambda word: word.at))
 
     def mark_booked(self, ids: Iterable[str]) -> None:
-        """Note that these stop requests are in the database."""
+        """Mark the stop requests with these ids as stored in the database."""
         self._change(ids, lambda word: replace(word, booked=True))
 
     def clear(self, ids: Iterable[str]) -> None:
-        """Remove stop requests that were released."""
+        """Remove the stop requests with these ids from the file, because they were released."""
         self._change(ids, lambda _: None)
 
     def replace_damaged(self) -> None:
@@ -116,14 +120,16 @@ class StopChannel:
             return
         with suppress(OSError), self._locked() as file:
             for number in range(_FIRST, _FIRST + WORDS):
-                found = _document(file, number)
+                found = document_in(file, number)
                 if found is not None and found["id"] == DAMAGED.id:
                     record = encoded(StopWord(DAMAGED.reason, DAMAGED.by, DAMAGED.via).document())
                     assert record is not None, "its texts are short"
                     write_record(file, number, record)
 
     def answer(self, role: int, answer: StopAnswer) -> None:
-        """Publish the worker's or supervisor's answer to the stop requests; an unchanged answer is not written."""
+        """Write the worker's or supervisor's answer to the stop requests: those seen, and those after which the bench
+        is safe. An unchanged answer is not written.
+        """
         if answer == self._answers[role]:
             return
         record = encoded({"by": answer.by, "seen": sorted(answer.seen), "safe": sorted(answer.safe)})
@@ -136,7 +142,7 @@ class StopChannel:
         self._answers[role] = answer
 
     def answered(self, role: int) -> StopAnswer:
-        """The last answer of worker or supervisor. Raises nothing."""
+        """Return the last answer of worker or supervisor; an empty one where none can be read. Raises nothing."""
         try:
             found = read_record(self._open(), role)
         except (OSError, Unreadable):
@@ -146,14 +152,14 @@ class StopChannel:
         return StopAnswer(found["by"], frozenset(found["seen"]), frozenset(found["safe"]))
 
     def state(self, word_id: str) -> str:
-        """The state of a stop request: "asked", "seen" or "safe"."""
+        """Return the state of a stop request by the answers to it: "asked", "seen" or "safe"."""
         answers = [self.answered(role) for role in (WORKER, SUPERVISOR)]
         if any(word_id in answer.safe for answer in answers):
             return "safe"
         return "seen" if any(word_id in answer.seen for answer in answers) else "asked"
 
     def listen(self, role: int) -> socket.socket | None:
-        """Open the receiving socket, as worker or as supervisor; None where there can be none."""
+        """Open the receiving socket of `role`, worker or supervisor; None where none can be opened."""
         try:
             return bound(self._folder, self._names[role])
         except OSError as error:
@@ -161,7 +167,9 @@ class StopChannel:
             return None
 
     def receive(self, listening: socket.socket) -> bool:
-        """Take all messages that came, stop requests into the file; True where one was a wake-up call."""
+        """Take all messages that came, and write stop requests into the file; return True where one was a wake-up call.
+        Never waits.
+        """
         woken = False
         while True:
             try:
@@ -212,25 +220,24 @@ class StopChannel:
 
     def _read(self) -> tuple[StopWord, ...]:
         """Read the stop requests; they are parsed again only after a change."""
-        size = WORDS * RECORD_BYTES
+        size, page = WORDS * RECORD_BYTES, b""
         for _ in range(20):
             page = os.pread(self._open(), size, _FIRST * RECORD_BYTES)
             if page == self._last[0]:
                 return self._last[1]
             with suppress(Unreadable):
-                records = (page[at : at + RECORD_BYTES] for at in range(0, len(page), RECORD_BYTES))
-                words = tuple(StopWord.of(document) for record in records if (document := decoded(record)) is not None)
+                words = words_in(page)
                 self._last = (page, words)
                 return words
             pause(0.001)
-        return (*(word for word in self._last[1] if word.id != DAMAGED.id), DAMAGED)
+        return (*words_in(page, leave_out_damaged=True), DAMAGED)
 
     def _write(self, word: StopWord) -> bool:
         """Write into the first free record; where none is free only a reason is lost: the bench is stopped."""
         with self._locked() as file:
             free: int | None = None
             for number in range(_FIRST, _FIRST + WORDS):
-                found = _document(file, number)
+                found = document_in(file, number)
                 if found is not None and found["id"] == word.id:
                     return True
                 if found is None and free is None:
@@ -261,7 +268,7 @@ class StopChannel:
     def _change_file(self, wanted: set[str], change: Callable[[StopWord], StopWord | None]) -> None:
         with self._locked() as file:
             for number in range(_FIRST, _FIRST + WORDS):
-                found = _document(file, number)
+                found = document_in(file, number)
                 if found is not None and found["id"] in wanted:
                     changed = None if found["id"] == DAMAGED.id else change(StopWord.of(found))
                     record = b"\0" * RECORD_BYTES if changed is None else encoded(changed.document())
@@ -272,14 +279,6 @@ class StopChannel:
         body = json.dumps(message).encode()
         sent = [send(self._folder, self._names[role], body) for role in roles]
         return any(sent)
-
-
-def _document(file: int, number: int) -> dict[str, Any] | None:
-    """The document in a record; one that is unreadable counts as damaged."""
-    try:
-        return read_record(file, number)
-    except Unreadable:
-        return {"id": DAMAGED.id}
 
 
 def _flocked(file: int) -> bool:

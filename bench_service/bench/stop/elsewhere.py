@@ -34,7 +34,9 @@ log = logging.getLogger(__name__)
 
 
 class ListenerRoad:
-    """A `bench_service.bench.stop.road.StopRoad` over TCP."""
+    """The route of a stop to a bench of another host, over TCP to the listener of its supervisor. Implements
+    `StopRoad`.
+    """
 
     here = False
 
@@ -44,7 +46,9 @@ class ListenerRoad:
         self._secret = secret
 
     def ask(self, word: StopWord) -> Sent:
-        """Send the stop request to the supervisor; not taken where it cannot be reached, or refuses."""
+        """Send the stop request to the supervisor and wait for its answer, within a time limit; not taken where it
+        cannot be reached, or refuses.
+        """
         try:
             found = self._exchange(word)
         except (BadMessage, OSError, ValueError, KeyError) as error:
@@ -70,7 +74,9 @@ class ListenerRoad:
 
 
 class StopAddresses:
-    """The addresses of all supervisors' listeners, read again and again while the database answers."""
+    """Keeps the addresses of all supervisors' listeners in memory, in a thread that reads them again and again while
+    the database answers.
+    """
 
     def __init__(self, read: Callable[[], Mapping[str, Listening]], secret_file: Path) -> None:
         """Set up with `read`, which asks the database for the addresses and raises `ServiceError`."""
@@ -81,7 +87,7 @@ class StopAddresses:
         self._thread = Thread(target=self._run, name="stop addresses", daemon=True)
 
     def begin(self) -> None:
-        """Begin to read the addresses."""
+        """Start the thread that reads the addresses."""
         self._thread.start()
 
     def end(self) -> None:
@@ -90,12 +96,12 @@ class StopAddresses:
         self._thread.join(LEARN_S)
 
     def road(self, bench_id: str) -> ListenerRoad | None:
-        """The way to a bench; None where its address or the secret is not known here."""
+        """Return the route to a bench of another host; None where its address or the secret is not known here."""
         at, secret = self._known.get(bench_id), read_secret(self._secret_file)
         return None if at is None or secret is None else ListenerRoad(bench_id, at, secret)
 
     def host(self, bench_id: str) -> str:
-        """The host of a bench; empty where it is not known."""
+        """Return the name of a bench's host; empty where it is not known."""
         at = self._known.get(bench_id)
         return "" if at is None else at.host
 

@@ -23,14 +23,16 @@ LATE_S = 2.0
 
 
 class StopBooks(Protocol):
-    """The part of the database that holds stops. Every verb raises `ServiceError` if it does not answer."""
+    """The part of the database that holds the stops of one bench. Interface; every verb raises `ServiceError` if the
+    database does not answer.
+    """
 
     def standing(self) -> tuple[BenchStop, ...]:
-        """The stops that keep the bench from working."""
+        """Return the stops that keep the bench from working, oldest first."""
         ...
 
     def stored(self, ids: Iterable[str]) -> tuple[BenchStop, ...]:
-        """Those of some stops that the database has, standing or released."""
+        """Return, of the stops with these ids, those that the database has, standing or released."""
         ...
 
     def enter(self, word: StopWord) -> None:
@@ -39,7 +41,7 @@ class StopBooks(Protocol):
 
 
 class StopExchange:
-    """Synchronizes the channel of one bench with the database. For one thread."""
+    """Brings the stop channel of one bench and the database into agreement. For use by one thread."""
 
     def __init__(self, channel: StopChannel, books: StopBooks) -> None:
         self._channel = channel

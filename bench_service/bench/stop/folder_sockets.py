@@ -10,7 +10,9 @@ LONGEST = 100
 
 
 def bound(folder: Path, name: str) -> socket.socket:
-    """Receiving end under a name, for this user alone; one that a dead process left is replaced. Raises `OSError`."""
+    """Return the receiving end of a datagram socket under a name in a folder, for this user alone; one that a dead
+    process left is replaced. Raises `OSError`.
+    """
     made = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
     try:
         with SocketAddress(folder, name) as address:
@@ -25,7 +27,9 @@ def bound(folder: Path, name: str) -> socket.socket:
 
 
 def send(folder: Path, name: str, body: bytes) -> bool:
-    """Send a message without waiting; True where a process receives it."""
+    """Send a message to the socket of that name without waiting; return True where a process receives it. Raises
+    nothing.
+    """
     with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sender:
         sender.setblocking(False)
         with SocketAddress(folder, name) as address:

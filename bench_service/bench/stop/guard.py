@@ -24,7 +24,9 @@ log = logging.getLogger(__name__)
 
 
 class StopGuard:
-    """Guards one bench from `begin` to `end`."""
+    """Guards the bench that this process drives, from `begin` to `end`: a thread that watches the stop channel, has the
+    bench made safe, and writes the heartbeat.
+    """
 
     def __init__(
         self,
@@ -56,7 +58,7 @@ class StopGuard:
         self._thread = Thread(target=self._run, name="stop guard", daemon=True)
 
     def begin(self) -> None:
-        """Begin to watch the channel. Channel and heartbeat must be prepared, the bench's lease held."""
+        """Start the guard's thread. Channel and heartbeat must be prepared, the bench's lease held."""
         self._socket = self._channel.listen(WORKER)
         self._thread.start()
 
@@ -65,7 +67,7 @@ class StopGuard:
         return bool(self._channel.standing())
 
     def end(self) -> None:
-        """End the guard's thread; the bench must be safe by then."""
+        """End the guard's thread and wait for it, then close channel and heartbeat; the bench must be safe by then."""
         self._ending.set()
         self._thread.join()
         if self._socket is not None:

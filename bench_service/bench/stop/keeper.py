@@ -14,7 +14,9 @@ log = logging.getLogger(__name__)
 
 
 class StopKeeper:
-    """Synchronizes the stops of one driven bench, so that without a supervisor too its stops reach the database."""
+    """Runs the exchange between stop channel and database for one driven bench in a thread, so that its stops reach the
+    database without a supervisor too.
+    """
 
     def __init__(self, channel: StopChannel, books: StopBooks) -> None:
         self._bench_id = channel.bench_id
@@ -24,7 +26,7 @@ class StopKeeper:
         self._thread = Thread(target=self._run, name="stop keeper", daemon=True)
 
     def begin(self) -> None:
-        """Begin to compare channel and database."""
+        """Start the thread that compares channel and database."""
         self._thread.start()
 
     def end(self) -> None:

@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 
 class StopListener:
-    """Listens for one bench, in threads of its own."""
+    """TCP server of a supervisor that takes stops for one bench from other hosts, in threads of its own."""
 
     def __init__(self, address: str, secret: bytes, channel: StopChannel, is_safe: Callable[[], bool]) -> None:
         """Set up to listen at `address`: `host:port`, port 0 for any. Raises `ValueError` for any other text."""
@@ -52,11 +52,11 @@ class StopListener:
         self._socket: socket.socket | None = None
 
     def begin(self) -> None:
-        """Begin to listen, as soon as the address can be bound."""
+        """Start the thread that binds the address, as soon as it can be bound, and takes connections."""
         Thread(target=self._run, name="stop listener", daemon=True).start()
 
     def listening(self) -> Listening | None:
-        """The address at which it listens now; None where it does not."""
+        """Return the address at which it listens now; None where it does not."""
         listening = self._socket
         if listening is None:
             return None

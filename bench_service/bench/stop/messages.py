@@ -29,7 +29,7 @@ class BadMessage(Exception):
 
 @dataclass(frozen=True)
 class Listening:
-    """The address of a supervisor's listener, and the host on which a person finds it."""
+    """The address of a supervisor's listener, and the name of its host for people."""
 
     address: str
     """The address as `host:port`."""
@@ -37,7 +37,7 @@ class Listening:
 
 
 def read_secret(file: Path) -> bytes | None:
-    """The secret in a file; None where the file has no usable one."""
+    """Return the shared secret in a file; None where the file has no usable one. Raises nothing."""
     try:
         found = file.read_bytes().strip()
     except OSError:
@@ -46,7 +46,9 @@ def read_secret(file: Path) -> bytes | None:
 
 
 def made_secret(file: Path) -> bytes | None:
-    """The secret in a file; an absent file is made, with a new secret. None where it cannot be made."""
+    """Return the shared secret in a file; an absent file is written with a new secret. None where it cannot be
+    written.
+    """
     try:
         made = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
     except OSError:  # it exists already, or the disk is full
@@ -61,7 +63,7 @@ def made_secret(file: Path) -> bytes | None:
 
 
 def new_number() -> str:
-    """A number that is used once."""
+    """Return a random number in hexadecimal, to be used once in one exchange."""
     return secrets.token_hex(16)
 
 
@@ -71,7 +73,7 @@ def proof(secret: bytes, what: str, numbers: tuple[str, str], text: str) -> str:
 
 
 def check(secret: bytes, what: str, numbers: tuple[str, str], message: dict[str, Any]) -> str:
-    """The text of a message whose proof holds. Raises `BadMessage`."""
+    """Return the text of a message whose proof holds. Raises `BadMessage` for a wrong or missing proof."""
     text, given = message.get("text"), message.get("proof")
     if not isinstance(text, str) or not isinstance(given, str):
         raise BadMessage("a message needs the fields text and proof")
@@ -81,12 +83,14 @@ def check(secret: bytes, what: str, numbers: tuple[str, str], message: dict[str,
 
 
 def send_line(connection: socket.socket, message: dict[str, Any]) -> None:
-    """Send a message as one line of JSON. Raises `OSError`."""
+    """Send a message as one line of JSON over a connection. Raises `OSError`."""
     connection.sendall(json.dumps(message).encode() + b"\n")
 
 
 def receive_line(connection: socket.socket, by_s: float) -> dict[str, Any]:
-    """Receive one message, complete by a deadline of the monotonic clock. Raises `BadMessage`, `OSError`."""
+    """Wait for one message and return it, complete by a deadline of the monotonic clock. Raises `BadMessage`,
+    `OSError`.
+    """
     found = b""
     while not found.endswith(b"\n"):
         left_s = by_s - monotonic_s()
@@ -107,7 +111,7 @@ def receive_line(connection: socket.socket, by_s: float) -> dict[str, Any]:
 
 
 def split_address(address: str) -> tuple[str, int]:
-    """Host and port of `host:port`. Raises `ValueError`."""
+    """Return host and port of the text `host:port`. Raises `ValueError` for any other text."""
     host, separator, port = address.rpartition(":")
     if not separator or not host or not port.isdecimal() or int(port) > 65_535:
         raise ValueError(f"{address!r} is not of the form host:port")

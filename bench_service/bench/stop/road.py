@@ -25,7 +25,7 @@ BENCH_ID = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")
 
 @dataclass(frozen=True)
 class Sent:
-    """The outcome of a stop request on its way to the bench."""
+    """Outcome of a stop request: whether a process took it, and the bench's safety where that process said so."""
 
     taken: bool
     """True where the bench has it: in the stop channel's file, or in the hands of its worker or supervisor."""
@@ -34,7 +34,7 @@ class Sent:
 
 
 class StopRoad(Protocol):
-    """One way of a stop to a bench."""
+    """A route of a stop to one bench. Interface: over the channel of this host, or over TCP to another one."""
 
     @property
     def here(self) -> bool:
@@ -47,7 +47,8 @@ class StopRoad(Protocol):
 
 
 class ChannelRoad:
-    """`StopRoad` over the channel in this host's device folder, and over the supervisor's listener where that fails.
+    """The route of a stop over the channel in this host's device folder, and over the supervisor's listener where the
+    channel fails. Implements `StopRoad`.
 
     The channel takes nothing where its file belongs to another user, or no descriptor is left.
     """
@@ -67,7 +68,9 @@ class ChannelRoad:
 
 
 class StopRoads:
-    """The ways to every bench that can be stopped from this process."""
+    """The routes of a stop to every bench that can be stopped from this process, with the channels of this host kept
+    open.
+    """
 
     def __init__(
         self,
@@ -101,18 +104,18 @@ class StopRoads:
             return found
 
     def to(self, bench_id: str) -> StopRoad | None:
-        """The way to a bench; None where the database is the only one."""
+        """Return the route to a bench; None where the database is the only one."""
         channel = self.channel(bench_id)
         return self._elsewhere(bench_id) if channel is None else ChannelRoad(channel, self._elsewhere)
 
     def wake(self, bench_id: str) -> None:
-        """Wake the bench's worker, if it is on this host: there may be something to do."""
+        """Wake the bench's worker, if it is on this host, so that it looks into its queue."""
         channel = self.channel(bench_id)
         if channel is not None:
             channel.wake()
 
     def unreached(self, bench_id: str, here: bool) -> str:
-        """The message to a person whose stop has reached no process; `here`: the bench is on this host."""
+        """Return the message to a person whose stop has reached no process; `here`: the bench is on this host."""
         host = HOST if here else self._where(bench_id)
         at = f"host {host}" if host else "the bench's own host"
         why = (

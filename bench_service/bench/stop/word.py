@@ -1,6 +1,6 @@
 """A stop request as the channel of a bench holds it, and the answer of worker and supervisor to it."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from datetime import datetime
 from typing import Any
 
@@ -12,7 +12,9 @@ REASON, BY = 500, 100
 
 @dataclass(frozen=True)
 class StopWord:
-    """One person's stop request: reason, person, time, and the way over which it came."""
+    """One person's stop request as the stop channel holds it: id, reason, person, time, and the route over which it
+    came.
+    """
 
     reason: str
     by: str
@@ -43,8 +45,16 @@ class StopWord:
 
     @classmethod
     def of(cls, document: dict[str, Any]) -> "StopWord":
-        """Read a request from a document. Raises `TypeError`, `ValueError`, `KeyError` for any other document."""
-        given: dict[str, Any] = {**document, "at": datetime.fromisoformat(document["at"])}
+        """Read a request from a document; fields of a newer version are left out.
+
+        Raises `TypeError`, `ValueError`, `KeyError`, `AttributeError` for any other document.
+        """
+        at = datetime.fromisoformat(document["at"])
+        if at.tzinfo is None:
+            raise ValueError(f"at = {document['at']!r}: a time with its zone is expected")
+        known = {each.name for each in fields(cls)}
+        given: dict[str, Any] = {name: value for name, value in document.items() if name in known}
+        given["at"] = at
         return cls(**given)
 
 
@@ -54,7 +64,9 @@ DAMAGED = StopWord("a record of the stop channel cannot be read", "the stop chan
 
 @dataclass(frozen=True)
 class StopAnswer:
-    """The worker's or supervisor's progress with the stop requests so far."""
+    """Progress of the worker or supervisor with the stop requests: ids of those that it has seen, and of those after
+    which the bench was safe.
+    """
 
     by: str = ""
     seen: frozenset[str] = frozenset()

@@ -127,7 +127,7 @@ def check(response: "httpx.Response") -> None:
 
 
 def segment(name: str) -> str:
-    """Quote a name as one segment of a path, whatever is in it."""
+    """Return a name quoted as one segment of a path, whatever is in it."""
     return quote(name, safe="")
 
 

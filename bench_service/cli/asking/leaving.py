@@ -24,7 +24,11 @@ LOOK_S = 0.1
 
 
 def leave(client: "httpx.Client", job: dict[str, Any], server: str | None, say: Callable[[str], object]) -> None:
-    """Leave a job in order and say what becomes of it. `server`: the service that drives it; None: this process."""
+    """Leave a job in order, as after Ctrl-C, and print what happens to it. `server`: the service that drives it; None:
+    this process.
+
+    A job that this process drives is paused.
+    """
     name = job["id"]
     if server is not None:
         at = f" --server {server}" if "://" in server else ""
@@ -51,7 +55,7 @@ def leave(client: "httpx.Client", job: dict[str, Any], server: str | None, say: 
 def leave_campaign(
     client: "httpx.Client", run_id: str, server: str | None, again: str, say: Callable[[str], object]
 ) -> None:
-    """Leave a campaign's run in order and say what becomes of it; where this process drives it, its job is paused."""
+    """Leave a campaign's run in order and print what happens to it; where this process drives it, its job is paused."""
     if server is not None:
         say(f"campaign run {run_id} continues in the service: {again}")
         return

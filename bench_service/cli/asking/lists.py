@@ -15,7 +15,7 @@ PAGE = 500
 
 
 def everything(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
-    """Read every page of a list."""
+    """Return all items of a list of the service, read page by page. Raises `Refused`."""
     items: list[dict[str, Any]] = []
     query: dict[str, Any] = {"limit": PAGE}
     while True:
@@ -27,7 +27,7 @@ def everything(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
 
 
 def newest(client: "httpx.Client", path: str, most: int, conditions: dict[str, Any]) -> dict[str, Any]:
-    """Read the newest items of a list that fulfil the conditions, as one page of any length; None is no condition.
+    """Return the newest items of a list that fulfil the conditions, as one page of any length; None is no condition.
 
     `since` and `until` are moments as people type them. Raises `Refused` for others.
     """

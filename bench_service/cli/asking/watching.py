@@ -49,7 +49,9 @@ class _Reasons:
 
 
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
-    """Follow a job until it has ended; return its last state. Raises `Refused` where the service is away for long."""
+    """Follow a job with a progress bar until it has ended, and return its last state. Raises `Refused` where the
+    service is away for long.
+    """
     page = f"{str(client.base_url).rstrip('/')}{job['page']}"
     goes_on = f"The service has job {job['id']} and continues it: {page} shows it, `bench jobs` lists it"
     with _progress(console) as progress:

@@ -23,7 +23,9 @@ CONDITIONS = ("unit", "procedure", "job", "verdict", "since", "until", "text", "
 
 
 def selection_of(where: list[str]) -> dict[str, Any]:
-    """Convert ``name=value`` conditions to a selection. Raises `Refused` with the known names."""
+    """Return the selection of recordings that ``name=value`` conditions state. Raises `Refused` with the known
+    names.
+    """
     selection: dict[str, Any] = {}
     for text in where:
         name, equals, value = text.partition("=")

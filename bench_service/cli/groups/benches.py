@@ -126,7 +126,9 @@ def release(
 
 
 def bench_of(client: "httpx.Client", settings: Settings, bench: str | None) -> str:
-    """Return the bench that is meant: the given one, the only one, or that of the settings. Raises `Refused`."""
+    """Return the id of the bench that a command is for: the given one, the only one, or that of the settings. Raises
+    `Refused`.
+    """
     if bench is not None:
         return bench
     known = [one["id"] for one in answer(client, "GET", "/api/v1/benches").json()]

@@ -6,6 +6,7 @@ import typer
 
 from bench_service.cli.groups.decisions import By, Newest, Remark, UnitRecords
 from bench_service.cli.options import AsJson, Server
+from bench_service.cli.refusal import Refused
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,7 +19,7 @@ def _table(items: list[dict[str, Any]]) -> "Table":
 
 
 correction = typer.Typer(no_args_is_help=True, help="A unit's current corrections: choose, approve, reject.")
-RECORDS = UnitRecords("correction", ("id", "kind", "current", "approval", "unusable"), _table)
+RECORDS = UnitRecords("correction", ("id", "kind", "current", "verdict", "approval", "unusable", "not_current"), _table)
 
 
 def corrections(
@@ -31,7 +32,7 @@ def corrections(
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """List a unit's corrections, newest first; at most one of each kind is current."""
+    """List a unit's corrections, newest first; at most one of each kind is current, and the others say why not."""
     RECORDS.print_newest(context, unit, {"limit": limit, "kind": kind}, server, as_json)
 
 
@@ -39,15 +40,25 @@ def corrections(
 def choose(
     context: typer.Context,
     unit: str,
-    correction_id: str,
+    correction_id: Annotated[str | None, typer.Argument(help="Id of the correction; none with --by-rule")] = None,
+    by_rule: Annotated[
+        str | None, typer.Option(help="Give this kind back to the rule: thermal, converter, thermometers, gyros")
+    ] = None,
     by: By = None,
     remark: Remark = "",
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Make a correction the one of its kind that new jobs use; one of a result that failed needs a remark."""
-    path = RECORDS.path(unit, correction_id, "current")
-    RECORDS.post(context, path, {"by": by, "remark": remark}, server, as_json)
+    body: dict[str, Any] = {"by": by, "remark": remark}
+    if (correction_id is None) == (by_rule is None):
+        raise Refused("exactly one of CORRECTION_ID and --by-rule KIND is needed")
+    if by_rule is not None:
+        body["kind"] = by_rule
+        path = RECORDS.path(unit, "choose-by-rule")
+    else:
+        path = RECORDS.path(unit, correction_id or "", "current")
+    RECORDS.post(context, path, body, server, as_json)
 
 
 RECORDS.add_approve_and_reject(correction)

@@ -20,7 +20,9 @@ Newest = Annotated[int, typer.Option(min=1, max=500, help="Number of the newest 
 
 @dataclass(frozen=True)
 class UnitRecords:
-    """Records of a unit of one kind on which people decide, as a service lists and changes them."""
+    """Commands on a unit's records of one kind (calibrations, corrections) on which people decide: addresses, table,
+    columns.
+    """
 
     name: str
     """Name of one such record; with an s, its part of the service's paths."""
@@ -29,13 +31,16 @@ class UnitRecords:
     table: "Callable[[list[dict[str, Any]]], Table]"
 
     def path(self, unit: str, *more: str) -> str:
-        """Path of a unit's records, or of something below it."""
+        """Return the path of a unit's records in the API, or of something below it."""
         return "/".join(("/api/v1/units", *map(segment, (unit, f"{self.name}s", *more))))
 
     def print_newest(
         self, context: typer.Context, unit: str, query: dict[str, Any], server: str | None, as_json: bool
     ) -> None:
-        """Print a unit's newest records, and why a current one is not usable; None leaves a condition out."""
+        """Print a unit's newest records, why a current one is not usable and why another is not current.
+
+        A condition of the query that is None is left out.
+        """
         given = {name: value for name, value in query.items() if value is not None}
         with connect(context.obj, server, drive=False) as client:
             items = call(client, "GET", self.path(unit), ("items",), params=given)["items"]
@@ -43,15 +48,17 @@ class UnitRecords:
         for one in () if as_json else items:
             if one["current"] and one["unusable"]:
                 console.print(one["unusable"], style="yellow", soft_wrap=True)
+            if why := one.get("not_current"):  # calibrations have none: their verdict and origin say it
+                console.print(why, style="dim", soft_wrap=True)
 
     def post(self, context: typer.Context, path: str, body: dict[str, Any], server: str | None, as_json: bool) -> None:
-        """Send a decision, and print the record as it is then."""
+        """Send a decision to the service, and print the record as it is then. Raises `Refused`."""
         with connect(context.obj, server, drive=False) as client:
             found = call(client, "POST", path, self.shown, json=body)
         show(found if as_json else [found], as_json, self.table)
 
     def add_approve_and_reject(self, group: typer.Typer) -> None:
-        """Add the commands `approve` and `reject` of such a record to its group of commands."""
+        """Add the commands `approve` and `reject` for this kind of record to its group of commands."""
         shown = f"{self.name}_id"
 
         @group.command("approve", help=f"Approve a {self.name}, and say until when it is valid.")

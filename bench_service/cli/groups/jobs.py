@@ -7,6 +7,7 @@ import typer
 
 from bench_service.cli.asking.client import RESULT, call, connect
 from bench_service.cli.asking.lists import newest
+from bench_service.cli.asking.start_time import start_time
 from bench_service.cli.completion import procedure_names
 from bench_service.cli.options import (
     NO_ITEMS,
@@ -45,6 +46,7 @@ def run(
     retries: Annotated[int, typer.Option(min=0, max=5, help="After faults of the bench")] = 0,
     reservation: Annotated[str | None, typer.Option(help="The reservation under which it runs")] = None,
     mounting: Annotated[str | None, typer.Option(help="The unit's mounting; default: the one in place")] = None,
+    at: Annotated[str | None, typer.Option(help="Not before this time: 22:30 or '2026-12-01 22:30'")] = None,
     key: Key = None,
     by: By = None,
     no_wait: Annotated[bool, typer.Option("--no-wait", help="Queue it and end; a service or worker runs it")] = False,
@@ -65,6 +67,7 @@ def run(
         "retries": retries,
         "reservation": reservation,
         "mounting": mounting,
+        **({} if at is None else {"not_before": start_time(at).isoformat()}),
     }
     headers = {"Idempotency-Key": key_or_new(key), **named(by)}
     settings = of_bench(context.obj, bench) if server is None else context.obj
@@ -86,7 +89,7 @@ def _queued(job: dict[str, Any], server: str | None, as_json: bool) -> None:
 
 
 def follow(client: "httpx.Client", job: dict[str, Any], server: str | None, as_json: bool) -> int:
-    """Watch a job to its end, print what came out, and return the exit code of its verdict.
+    """Watch a job to its end, print its result, and return the exit code of its verdict.
 
     Ctrl-C: a job of a service continues there; one that this process drives is paused.
     """

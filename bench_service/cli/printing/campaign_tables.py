@@ -9,7 +9,7 @@ COLOURS = {"pass": "green", "fail": "red", "error": "yellow"}
 
 
 def run_table(run: dict[str, Any]) -> Table:
-    """Table of a run, step by step: outcome, failed checks and warnings."""
+    """Return the table of a run, step by step: outcome, failed checks and warnings."""
     table = _table(
         "step", "does", "state", "verdict", "checks", "what to know", title=f"{run['campaign']} {run['unit']}"
     )
@@ -24,7 +24,7 @@ def run_table(run: dict[str, Any]) -> Table:
 
 
 def campaign_table(items: list[dict[str, Any]]) -> Table:
-    """Table of campaigns with their steps."""
+    """Return the table of campaigns with the names of their steps."""
     table = _table("campaign", "title", "steps", "")
     for item in items:
         steps = ", ".join(step["name"] for step in item["campaign"]["steps"])
@@ -33,7 +33,7 @@ def campaign_table(items: list[dict[str, Any]]) -> Table:
 
 
 def runs_table(items: list[dict[str, Any]]) -> Table:
-    """Table of campaign runs, newest first."""
+    """Return the table of campaign runs, in the order given."""
     table = _table("run", "campaign", "unit", "state", "verdict", "asked for", "what to know")
     for run in items:
         told = run["waiting"] or run["reason"]
@@ -43,11 +43,12 @@ def runs_table(items: list[dict[str, Any]]) -> Table:
 
 
 def schedule_table(items: list[dict[str, Any]]) -> Table:
-    """Table of schedules with their next and last starts."""
+    """Return the table of schedules with their next and last starts."""
     table = _table("schedule", "campaign", "unit", "cron", "zone", "next, UTC", "last outcome")
     for one in items:
         next_at = (one["next_at"] or "off")[:16].replace("T", " ")
-        row = (one["id"], one["campaign"], one["unit"], one["cron"], one["time_zone"], next_at)
+        times = ("once", "") if one.get("once") else (one["cron"], one["time_zone"])
+        row = (one["id"], one["campaign"], one["unit"], *times, next_at)
         table.add_row(*row, one["last_outcome"])
     return table
 

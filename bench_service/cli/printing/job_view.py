@@ -10,7 +10,7 @@ from bench_service.cli.printing.moments import moment
 
 
 def job_view(job: dict[str, Any]) -> Table:
-    """Table of a job, a fact a row; facts that there are not are left out."""
+    """Return the table of a job, a fact a row; facts that it does not have are left out."""
     done, place, prompt, failure = job["progress"], job["queue"], job["prompt"], job["error"]
     left_s = done["eta_s"]
     rows = {
@@ -41,6 +41,6 @@ def job_view(job: dict[str, Any]) -> Table:
 
 
 def state_of(job: dict[str, Any]) -> str:
-    """Say the state of a job, and whether it is about to change."""
+    """Return the state of a job as text, and whether it is about to change."""
     leaves = job["state"] == "running" and job.get("pause_requested")
     return f"{job['state']}, to be paused before its next station" if leaves else job["state"]

@@ -1,6 +1,6 @@
-"""Moments for a terminal."""
+"""Format of the service's times on a terminal."""
 
 
 def moment(text: str | None) -> str:
-    """Format a moment of the service to the second, in UTC."""
+    """Return a time of the service as text to the second, in UTC; a dash for None."""
     return "–" if text is None else f"{text[:19].replace('T', ' ')} UTC"

@@ -7,7 +7,7 @@ from rich.table import Table
 
 
 def proposal_table(columns: Sequence[Any]) -> Table:
-    """Build the table of the channels that are proposed."""
+    """Return the table of the channels that an import proposes."""
     table = Table(title="proposed channels")
     for name in ("channel", "column", "quantity", "unit", "scale", "mean", "deviation", "from"):
         table.add_column(name, justify="right" if name in ("scale", "mean", "deviation") else "left", overflow="fold")

@@ -16,7 +16,7 @@ ROWS_MAX = 60
 
 
 def report_tables(name: str, document: dict[str, Any]) -> Iterator[ScreenTable]:
-    """Build each table of the report that a method or procedure gives of a result.
+    """Yield each table of the report that a method or procedure gives of a result.
 
     None where this version does not know the name, or where a service of another version wrote the document.
     """

@@ -6,7 +6,7 @@ from rich.table import Table
 
 
 def share_table(raw: dict[str, Any]) -> Table:
-    """Table of recordings and bytes by the place of their raw data."""
+    """Return the table of recordings and bytes by the place of their raw data."""
     table = Table("raw data", "recordings", "GB")
     for place, share in raw.items():
         table.add_row(place, str(share["recordings"]), f"{share['stored_bytes'] / 1e9:.3f}")
@@ -14,7 +14,7 @@ def share_table(raw: dict[str, Any]) -> Table:
 
 
 def prediction_table(predicted: list[dict[str, Any]], growth: dict[str, Any]) -> Table:
-    """Table of the predicted sizes of the database."""
+    """Return the table of the predicted sizes of the database [GB], without and with the rules."""
     per_day = growth["stored_bytes"] / growth["days"] / 1e6
     table = Table("in days", "GB without rules", "GB with the rules", title=f"growth {per_day:.1f} MB a day")
     for one in predicted:

@@ -16,7 +16,9 @@ CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction"
 
 
 def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]] | None) -> tuple[Table, float]:
-    """Estimate ± standard uncertainty σ, truth, error in sigmas; and the largest error in sigmas (0 without truth)."""
+    """Return the table of estimate ± standard uncertainty σ, truth, error in sigmas; and the largest error in sigmas (0
+    without truth).
+    """
     table = Table(title="Coefficients, U = b + K·v")
     for column in ("coefficient", "unit", "estimate", "± σ", "truth", "error / σ"):
         table.add_column(column, justify="left" if column in ("coefficient", "unit") else "right", no_wrap=True)
@@ -40,7 +42,7 @@ def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]]
 
 
 def check_table(document: dict[str, Any]) -> Table:
-    """Table of checks, each value next to its limit with its source; the notes stand below."""
+    """Return the table of a result's checks, each value next to its limit with its source; the notes stand below."""
     table = Table(title="Checks")
     words = ("check", "unit", "source of the limit", "outcome")
     for column in ("check", "value", "U", "limit", "unit", "source of the limit", "outcome"):
@@ -66,7 +68,9 @@ def check_table(document: dict[str, Any]) -> Table:
 
 
 def budget_table(document: dict[str, Any], coefficient: str) -> Table:
-    """Uncertainty budget of one coefficient, named as in the result ("gyro.K11"). Raises `KeyError` with the names."""
+    """Return the uncertainty budget of one coefficient, named as in the result ("gyro.K11"). Raises `KeyError` with the
+    names.
+    """
     parts = [*document.get("triads", []), document.get("gyro") or {}, document.get("accelerometer") or {}]
     found = {b["coefficient"]: b for part in parts for b in part.get("budgets", [])}
     if coefficient not in found:
@@ -93,7 +97,7 @@ def show_warnings(document: dict[str, Any], to: Console) -> None:
 
 
 def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
-    """Table of calibrations: their origin, which one counts and by whose choice, and how long."""
+    """Return the table of calibrations: their origin, which one is current and by whose choice, and how long."""
     table = Table()
     for column in ("calibration", "triad", "made", "method", "verdict", "current", "approval", "valid until"):
         table.add_column(column, overflow="fold", no_wrap=column == "calibration")
@@ -108,20 +112,21 @@ def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
 
 
 def correction_table(corrections: list[dict[str, Any]]) -> Table:
-    """Table of corrections: the result that gave each, which one of its kind counts, and how long."""
+    """Return the table of corrections: the result that gave each, which one of its kind is current, and how long."""
     table = Table()
-    for column in ("correction", "kind", "made", "result", "current", "approval", "valid until"):
+    for column in ("correction", "kind", "made", "result", "verdict", "current", "approval", "valid until"):
         table.add_column(column, overflow="fold")
     for one in corrections:
-        current = ("current, not usable" if one["unusable"] else "current") if one["current"] else ""
+        chosen = ("by rule" if one["by_rule"] else "chosen") if one["current"] else ""
+        current = f"{chosen}, not usable" if chosen and one["unusable"] else chosen
         until = one["valid_until"] or "–"
-        cells = (one["made_at"][:19], one["result"], current, one["approval"], until[:19])
+        cells = (one["made_at"][:19], one["result"], one["verdict"], current, one["approval"], until[:19])
         table.add_row(one["id"], one["kind"], *cells)
     return table
 
 
 def job_table(jobs: list[dict[str, Any]]) -> Table:
-    """Table of jobs, newest first."""
+    """Return the table of jobs, in the order given."""
     table = Table()
     for column in ("", "job", "procedure", "unit", "state", "verdict", "stations", "submitted"):
         table.add_column(column, no_wrap=column == "job")
@@ -145,7 +150,7 @@ def _entry(triad: dict[str, Any], channel: int, column: int) -> float:
 
 
 def recording_table(recordings: list[dict[str, Any]]) -> Table:
-    """Table of recordings, newest first."""
+    """Return the table of recordings, in the order given."""
     table = _table("recording", "unit", "station or files", "channels", "rate, Hz", "length, s", "made")
     for one in recordings:
         files = ", ".join(str(file.get("name")) for file in one["source"].get("files", []))
@@ -164,7 +169,7 @@ def recording_line(recording: dict[str, Any]) -> str:
 
 
 def result_table(results: list[dict[str, Any]]) -> Table:
-    """Table of results, newest first."""
+    """Return the table of results, in the order given."""
     table = _table("result", "procedure or method", "unit", "verdict", "job", "made")
     table.columns[4].no_wrap = True
     for one in results:
@@ -176,7 +181,7 @@ def result_table(results: list[dict[str, Any]]) -> Table:
 
 
 def batch_table(batches: list[dict[str, Any]]) -> Table:
-    """Table of batches of analyses, newest first."""
+    """Return the table of batches of analyses, in the order given."""
     table = _table("batch", "method", "state", "analyses", "done", "reused", "failed", "submitted")
     for one in batches:
         numbers = (str(one["counts"][state]) for state in ("done", "reused", "failed"))
@@ -186,7 +191,7 @@ def batch_table(batches: list[dict[str, Any]]) -> Table:
 
 
 def unit_table(units: list[dict[str, Any]]) -> Table:
-    """Table of units with what is current of each."""
+    """Return the table of units with the current calibration and corrections of each."""
     table = _table("unit", "rate, Hz", "channels", *(name.replace("_", " ") for name in CURRENT))
     for one in units:
         current = [one.get(name) or "–" for name in CURRENT]
@@ -195,7 +200,7 @@ def unit_table(units: list[dict[str, Any]]) -> Table:
 
 
 def reservation_table(reservations: list[dict[str, Any]]) -> Table:
-    """Table of reservations, newest first."""
+    """Return the table of reservations, in the order given."""
     table = _table("reservation", "of", "holder", "until", "holds now", "note")
     for one in reservations:
         of = f"bench {one['bench']}" if one["bench"] else f"unit {one['unit']}"
@@ -205,7 +210,7 @@ def reservation_table(reservations: list[dict[str, Any]]) -> Table:
 
 
 def mounting_table(mountings: list[dict[str, Any]]) -> Table:
-    """Table of mountings, newest first."""
+    """Return the table of mountings, in the order given."""
     table = _table("mounting", "unit", "bench", "plate", "azimuth, deg", "± arcsec", "by", "mounted", "until")
     for one in mountings:
         until = "it stands" if one["ended_at"] is None else moment(one["ended_at"])
@@ -216,7 +221,7 @@ def mounting_table(mountings: list[dict[str, Any]]) -> Table:
 
 
 def queue_table(entries: list[dict[str, Any]]) -> Table:
-    """Table of the jobs that wait for a bench, in the order in which they start."""
+    """Return the table of the jobs that wait for a bench, in the order in which they start."""
     table = _table("place", "", "job", "unit", "priority", "queued", "waiting")
     for one in entries:
         numbers = str(one["position"]), f"#{one['number']}", one["job"], Text(one["unit"]), str(one["priority"])
@@ -225,7 +230,7 @@ def queue_table(entries: list[dict[str, Any]]) -> Table:
 
 
 def procedure_table(entries: list[dict[str, Any]]) -> Table:
-    """Table of procedures or methods with the names of their parameters."""
+    """Return the table of procedures or methods with the names of their parameters."""
     table = _table("name", "version", "title", "parameters")
     for one in entries:
         table.add_row(
@@ -235,7 +240,7 @@ def procedure_table(entries: list[dict[str, Any]]) -> Table:
 
 
 def parameter_table(entry: dict[str, Any]) -> Table:
-    """Table of the parameters of a procedure or method: default and description of each."""
+    """Return the table of the parameters of a procedure or method: default and description of each."""
     table = _table("parameter", "default", "description", title=entry["title"])
     for name, schema in entry["parameters"].get("properties", {}).items():
         default = Text("needed") if "default" not in schema else Text(json.dumps(schema["default"], ensure_ascii=False))
@@ -244,7 +249,7 @@ def parameter_table(entry: dict[str, Any]) -> Table:
 
 
 def uncertainty_table(predicted: list[dict[str, Any]]) -> Table:
-    """Table of the uncertainties that a plan is expected to have, and what they come from."""
+    """Return the table of the uncertainties that a plan is expected to have, and of their origins."""
     table = _table("quantity", "unit", "expected σ", "from noise", "from the table", title="Expected uncertainties")
     for one in predicted:
         figures = (one["standard_uncertainty"], one["from_noise"], one["from_table"])
@@ -253,7 +258,7 @@ def uncertainty_table(predicted: list[dict[str, Any]]) -> Table:
 
 
 def outcome_table(plans: list[dict[str, Any]], outcomes: list[dict[str, Any]]) -> Table:
-    """Table of the previews of a batch: duration and warnings of each plan, or why it cannot be run."""
+    """Return the table of the previews of a batch: duration and warnings of each plan, or why it cannot be run."""
     table = _table("plan", "procedure", "unit", "duration, h", "outcome")
     for number, (plan, outcome) in enumerate(zip(plans, outcomes, strict=True), start=1):
         made, refusal = outcome["preview"], outcome["refusal"]
@@ -274,7 +279,7 @@ def _table(*columns: str, title: str | None = None) -> Table:
 
 
 def live_table(bench: str, live: dict[str, Any]) -> Table:
-    """Table of a bench's live readings; one row a reading."""
+    """Return the table of a bench's live readings; one row a reading."""
     table = Table(title=f"bench {bench}, {moment(live['at'])}")
     table.add_column("reading")
     table.add_column("value", justify="right", no_wrap=True)

@@ -18,9 +18,8 @@ PASS, REFUSED = 0, 1
 
 
 def check_bench_file(path: Path, connect: bool, console: Console) -> int:
-    """Print the devices of a bench file and everything that would be refused; the exit code.
-
-    Raises `Misconfigured` for a file that cannot be read.
+    """Print the devices of a bench file and everything that would be refused; return the exit code. Raises
+    `Misconfigured` for a file that cannot be read.
     """
     file = read_bench_file(path)
     units = read_units(file.folder / "units")

@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 
 
 class Companion:
-    """Starts a supervisor process and restarts it when it ends; the process outlives this one."""
+    """Starts a supervisor as a process of its own and restarts it when it ends; that process outlives this one."""
 
     def __init__(self, bench_id: str, spawn: Callable[[], Process], supervised: Callable[[], bool]) -> None:
         """`spawn` starts a supervisor; `supervised`: returns whether any process supervises the bench now."""
@@ -49,7 +49,7 @@ class Companion:
         self._pause_s = AGAIN_S
 
     def look(self, now_s: float) -> None:
-        """Note the companion's end, and start it if that is due."""
+        """Check once whether the companion has ended, and start it if that is due."""
         if self._process is not None:
             code = self._process.poll()
             if code is None:
@@ -62,7 +62,7 @@ class Companion:
             self._start(now_s)
 
     def leave(self) -> None:
-        """Wait a moment for the companion's end; if it has work left, it continues alone."""
+        """Wait a moment for the companion's end; if it still has work to do, it continues alone."""
         if self._process is None:
             return
         try:

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 
 class BoundedConnections(HttpToolsProtocol):
-    """uvicorn's HTTP protocol with an end to idle connections."""
+    """uvicorn's HTTP protocol with a limit on idle connections, of which the oldest are closed."""
 
     most = WANTED
     """Largest number of connections at once."""
@@ -55,7 +55,7 @@ class BoundedConnections(HttpToolsProtocol):
 
     @property
     def idle(self) -> bool:
-        """Return whether the connection has no request at work now."""
+        """True where the connection has no request at work now."""
         return not self._begun or self.cycle.response_complete
 
     def _end_if_idle(self) -> None:
@@ -87,7 +87,9 @@ def raise_descriptors() -> int:
 
 
 def lengthen_queue(sockets: list[socket.socket]) -> None:
-    """Let more connections wait than are accepted at once, so that none is refused while the oldest are closed."""
+    """Let more connections wait in the sockets' queues than are accepted at once, so that none is refused while the
+    oldest are closed.
+    """
     for listening in sockets:
         with suppress(OSError), socket.socket(fileno=socket.dup(listening.fileno())) as same:
             same.listen(QUEUE)

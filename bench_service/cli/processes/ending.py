@@ -19,7 +19,7 @@ ENDS = (signal.SIGTERM, signal.SIGHUP)
 
 
 def ending_on_signals() -> threading.Event:
-    """Create an event that SIGTERM, SIGINT or SIGHUP sets from now on. Must be called in the main thread."""
+    """Return an event that SIGTERM, SIGINT or SIGHUP sets from now on. Must be called in the main thread."""
     ending = threading.Event()
     _call_on((*ENDS, signal.SIGINT), ending.set)
     return ending

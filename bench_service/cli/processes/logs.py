@@ -29,12 +29,14 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066
 
 
 def visible(text: str) -> str:
-    """Escape the control characters of a text, so that it stays one line and commands no terminal; hide tokens."""
+    """Return a text with its control characters escaped, so that it stays one line and commands no terminal, and with
+    tokens hidden.
+    """
     return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], without_tokens(text))
 
 
 class Lines(logging.Formatter):
-    """Format a record as one line for a person; a traceback follows on marked lines of its own."""
+    """Formatter of log records as one line for a person; a traceback follows on marked lines of its own."""
 
     def format(self, record: logging.LogRecord) -> str:
         about: dict[str, str] = getattr(record, "subjects", {})

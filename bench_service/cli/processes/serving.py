@@ -9,9 +9,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import uvicorn
+from fastapi import FastAPI
 
 from bench_service.api.access.identify import Proxies, behind_proxies
 from bench_service.api.http.door import Door, may_listen
+from bench_service.api.http.late_routes import LateRoutes
 from bench_service.app import create_app, open_service
 from bench_service.cli.processes.allocator import limit_allocator
 from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
@@ -74,18 +76,18 @@ def ready(
         for server in servers:
             server.end()
 
-    with calling_at_end(end), _opened(settings, drive, socket_file, level) as (server, service):
+    with calling_at_end(end), _opened(settings, drive, socket_file, level) as (server, service, late):
         servers.append(server)
         if early.is_set():
             server.end()
         yield server
-        _check_start(service)
+        _check_start(service, late)
 
 
 @contextmanager
 def _opened(
     settings: Settings, drive: bool, socket_file: Path | None, level: str
-) -> Generator[tuple[_Server, BenchService]]:
+) -> Generator[tuple[_Server, BenchService, LateRoutes]]:
     set_up(settings, level)
     sys.setswitchinterval(SWITCH_S)
     protect(settings)
@@ -94,21 +96,21 @@ def _opened(
     if socket_file is None:
         check_address(settings)
     rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)
+
+    late = LateRoutes(lambda: server.end())
     with ExitStack() as closing:
         with no_collection():
             service = open_service(settings, closing, drive, apart=socket_file is None)
-            server = _server(settings, socket_file, service, closing, rules)
-
+            max_bytes, proxies = int(settings.max_import_mb * 1e6), Proxies.of(settings)
+            app = create_app(service, max_bytes, closing.close, rules, proxies, late)
+            server = _server(settings, socket_file, app)
         service.at_failed_start(server.end)
-        yield server, service
+        yield server, service, late
 
 
-def _server(
-    settings: Settings, socket_file: Path | None, service: BenchService, closing: ExitStack, rules: Door
-) -> _Server:
-    """Set up the server of an open service; `closing` is closed when it shuts down."""
+def _server(settings: Settings, socket_file: Path | None, app: FastAPI) -> _Server:
     config = uvicorn.Config(
-        create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules, Proxies.of(settings)),
+        app,
         settings.host,
         settings.port,
         uds=None if socket_file is None else str(socket_file),
@@ -123,8 +125,8 @@ def _server(
     return _Server(config)
 
 
-def _check_start(service: BenchService) -> None:
-    failure = service.failed_start()
+def _check_start(service: BenchService, late: LateRoutes) -> None:
+    failure = service.failed_start() or late.failure()
     if failure is not None:
         raise failure
 
@@ -161,16 +163,17 @@ def serving(settings: Settings, drive: bool = True, socket_file: Path | None = N
 
     Raises as `ready`, but before the block is entered.
     """
-    with _opened(settings, drive, socket_file, "warning") as (running, service):
+    with _opened(settings, drive, socket_file, "warning") as (running, service, late):
         thread = threading.Thread(target=running.run, name="http")
         thread.start()
         try:
             while not running.started:
                 if not thread.is_alive():
-                    _check_start(service)
+                    _check_start(service, late)
                     raise Refused("the service did not start; the lines above say why")
                 pause(0.01)
             service.require_start()
+            late.require()
             yield
         finally:
             running.should_exit = True

@@ -12,7 +12,7 @@ LOOK_S = 0.1
 
 
 def simulate(path: Path, faults: Path | None, say: Callable[[str], object]) -> None:
-    """Serve until a signal ends it. Raises `Misconfigured`."""
+    """Serve the devices of a bench file as simulators, and block until a signal ends it. Raises `Misconfigured`."""
     bench = served_bench(read_bench_file(path), faults)
     ending = ending_on_signals()
     asyncio.run(serve(bench, ending.is_set, say, LOOK_S))

@@ -35,7 +35,8 @@ SUPERVISED_ALREADY = 3
 
 
 def supervise(settings: Settings, companion: bool, say: Callable[[str], object]) -> int:
-    """Supervise the settings' bench until SIGTERM or SIGINT; the exit code. Raises `BenchBusy` if it is supervised.
+    """Supervise the settings' bench until SIGTERM or SIGINT, and return the exit code. Raises `BenchBusy` if it is
+    supervised.
 
     A companion then leaves it at that, and ends with `SUPERVISED_ALREADY`: one supervisor looks after every process
     that drives the bench.

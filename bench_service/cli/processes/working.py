@@ -14,7 +14,8 @@ from bench_service.settings import Settings
 
 
 def work(settings: Settings, say: Callable[[str], object]) -> None:
-    """Drive the settings' bench until SIGTERM or SIGINT; then the bench is made safe, and its job left as it is.
+    """Drive the settings' bench, and block until SIGTERM or SIGINT; then the bench is made safe, and its job left for
+    the next start.
 
     Raises what `open_service` raises, `BenchBusy` first of all, and `NotDriving` where the engine does not start.
     """

@@ -39,9 +39,10 @@ AFTER_DEMAND = "after_demand_s"
 def described(
     file: BenchFile, simulated: BenchDescription | None, found: Mapping[Kind, Found] | None = None
 ) -> BenchDescription:
-    """Describe the bench. `simulated`: the description of the simulated devices, None where there are none.
+    """Return the description of the bench: limits, accuracy, site, devices with their certificates.
 
-    `found`: findings of the devices that were reached; the narrower of their limits and the file's hold.
+    `simulated`: the description of the simulated devices, None where there are none. `found`: findings of the devices
+    that were reached; the narrower of their limits and the file's hold.
     """
     told = found or {}
     sections = {

@@ -40,14 +40,16 @@ REQUIRED: tuple[Kind, ...] = ("turntable", "supply", "unit_link")
 
 
 class Identity(Section):
-    """Table ``[bench]`` of a bench file."""
+    """Table ``[bench]`` of a bench file: id and title."""
 
     id: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
     title: str = ""
 
 
 class SiteSection(Section):
-    """Table ``[site]``; see `procedures.core.site.Site`."""
+    """Table ``[site]`` of a bench file: gravity, latitude, azimuth with uncertainties; see
+    `procedures.core.site.Site`.
+    """
 
     latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)]
     gravity_m_s2: Annotated[float, Field(ge=9.7, le=9.9)]
@@ -59,7 +61,7 @@ class SiteSection(Section):
 
 
 class Policy(Section):
-    """Table ``[policy]`` of a bench file."""
+    """Table ``[policy]`` of a bench file: what an expired certificate leads to."""
 
     expired_certificate: Literal["refuse", "warn"] = "refuse"
 
@@ -89,7 +91,7 @@ class Rest(Section):
 
 @dataclass(frozen=True)
 class BenchFile:
-    """A bench file, read and checked."""
+    """A bench file, read and checked: the sections of its devices, and its other tables."""
 
     path: Path
     rest: Rest
@@ -98,7 +100,7 @@ class BenchFile:
 
     @property
     def id(self) -> str:
-        """Id of the bench."""
+        """Id of the bench, by which the database knows it."""
         return self.rest.bench.id
 
     @property
@@ -107,12 +109,12 @@ class BenchFile:
         return self.path.parent
 
     def real(self) -> dict[Kind, DeviceSection]:
-        """Sections of the devices that are on wires."""
+        """Return the sections of the devices that are real or behind an address, by kind."""
         return {kind: section for kind, section in self.devices.items() if isinstance(section, Wire)}
 
     @property
     def time_factor(self) -> float:
-        """Bench seconds per real second."""
+        """Number of bench seconds per real second; not 1 only where served simulators run faster."""
         return self.rest.simulation.time_factor
 
     def within(self, kind: Kind) -> bool:
@@ -126,7 +128,9 @@ class BenchFile:
 
 
 def read_bench_file(path: Path) -> BenchFile:
-    """Read a bench file. Raises `Misconfigured` naming line and field, also for a driver that does not exist."""
+    """Read and check a bench file, and return it. Raises `Misconfigured` naming line and field, also for a driver that
+    does not exist.
+    """
     text = text_of(path)
     given = document_of(path, text)
     tables: dict[str, Any] = {name: value for name, value in given.items() if name not in KINDS}
@@ -145,6 +149,9 @@ def read_bench_file(path: Path) -> BenchFile:
     if rest.operator.driver not in (SIMULATED, "asked"):
         at = place(path, text, ("operator", "driver"))
         raise Misconfigured(f'{at}: operator.driver = {rest.operator.driver!r} must be "asked" or "simulated"')
+    if rest.operator.address is not None and rest.operator.address.scheme != "tcp":
+        at = place(path, text, ("operator", "address"))
+        raise Misconfigured(f"{at}: operator.address = {rest.operator.address}: a served person listens on tcp")
     return file
 
 

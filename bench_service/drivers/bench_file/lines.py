@@ -8,7 +8,8 @@ KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-
 
 
 def line_of(text: str, path: Sequence[object]) -> int | None:
-    """Number of the line of the deepest part of a key's path that stands in the text, from 1; None: no part does.
+    """Return the number of the line of the deepest part of a key's path that stands in the text, from 1; None: no part
+    does.
 
     Parts that are numbers count the tables of an array, ``[[channels]]``, and are left out of names.
     """

@@ -18,7 +18,9 @@ LARGEST = 1_000_000
 
 
 def text_of(path: Path) -> str:
-    """Read a file as text. Raises `Misconfigured` naming it."""
+    """Return the content of a file as text. Raises `Misconfigured` naming the file where it cannot be read, is too
+    large or not UTF-8.
+    """
     try:
         if path.stat().st_size > LARGEST:
             raise Misconfigured(f"{path} is larger than {LARGEST} bytes, the most that a bench file may have")
@@ -30,7 +32,7 @@ def text_of(path: Path) -> str:
 
 
 def document_of(path: Path, text: str) -> dict[str, Any]:
-    """Parse TOML text. Raises `Misconfigured` with the line and column of what is not TOML."""
+    """Return the tables of a TOML text. Raises `Misconfigured` with the line and column of what is not TOML."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -38,7 +40,9 @@ def document_of(path: Path, text: str) -> dict[str, Any]:
 
 
 def validated(model: type[M], given: Any, path: Path, text: str, where: Sequence[str] = ()) -> M:
-    """Validate a table of a file. `where`: path of the table. Raises `Misconfigured` with line, field and reason."""
+    """Return a table of a file as its model. `where`: path of the table. Raises `Misconfigured` with line, field and
+    reason.
+    """
     try:
         return model.model_validate(given)
     except ValidationError as error:
@@ -49,7 +53,7 @@ def validated(model: type[M], given: Any, path: Path, text: str, where: Sequence
 
 
 def place(path: Path, text: str, where: Sequence[object]) -> str:
-    """The file and the line of a field, as text."""
+    """Return the file and the line of a field, as text for a message."""
     line = line_of(text, where)
     return f"{path}" if line is None else f"{path}, line {line}"
 

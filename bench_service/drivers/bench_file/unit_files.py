@@ -87,7 +87,7 @@ class TriadTable(Section):
 
 
 class CoefficientsTable(Section):
-    """Table ``[[coefficients]]``: a unit as it was found, or left, at a calibration."""
+    """Table ``[[coefficients]]``: coefficients of a unit as it was found, or left, at a calibration."""
 
     state: Literal["as found", "as left"]
     day: date
@@ -97,7 +97,7 @@ class CoefficientsTable(Section):
 
 
 class UnitFile(Section):
-    """File of one declared unit."""
+    """File of one declared unit: identity, channels, noise, and coefficients of earlier calibrations."""
 
     serial: str = Field(pattern=SERIAL)
     model: str = ""
@@ -119,7 +119,7 @@ class UnitFile(Section):
 
 
 def read_units(folder: Path) -> tuple[Unit, ...]:
-    """Read every ``*.toml`` of a folder, by name; none where there is no folder.
+    """Return the units of every ``*.toml`` of a folder, in the order of their names; none where there is no folder.
 
     Raises `Misconfigured` with file, line and field, and for a file whose name is not its unit's serial.
     """
@@ -127,7 +127,7 @@ def read_units(folder: Path) -> tuple[Unit, ...]:
 
 
 def read_unit(path: Path) -> Unit:
-    """Read a unit's file. Raises `Misconfigured`."""
+    """Return the unit that a file declares. Raises `Misconfigured` with file, line and field."""
     text = text_of(path)
     given = validated(UnitFile, document_of(path, text), path, text)
     if path.stem != given.serial:

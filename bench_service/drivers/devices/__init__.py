@@ -1,1 +1,1 @@
-"""Drivers of devices: a port of the bench over a protocol and a line."""
+"""Drivers of devices: each implements an interface of `procedures.bench` over a protocol and a line."""

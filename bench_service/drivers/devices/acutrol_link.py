@@ -54,7 +54,9 @@ class AcutrolSection(WireTurntable):
 
 
 class AcutrolLink:
-    """Controller of three axes as typed requests; knows its language, and no motion."""
+    """Controller of three axes as typed requests over its line; knows its language, and no motion. Every request waits,
+    and raises `Disconnected`, `DeviceFault`.
+    """
 
     def __init__(self, section: AcutrolSection, note: Note) -> None:
         self.axes = (section.outer.number, section.middle.number, section.inner.number)
@@ -72,17 +74,17 @@ class AcutrolLink:
         """Factory limits of the axes, known once a line was made."""
 
     async def identify(self) -> DeviceIdentity:
-        """Ask for the identity."""
+        """Ask for maker, model, serial and firmware, and return them."""
         return await self._ask(acutrol.IDENTITY_QUERY, self._identity)
 
     async def states(self) -> tuple[AxisState, ...]:
-        """Position and rate of outer, middle and inner axis, by one request."""
+        """Return position [deg] and rate [deg/s] of outer, middle and inner axis, read by one request."""
         return await self._ask(
             acutrol.states_query(self.axes), lambda a: acutrol.states(self._dialect, a, len(self.axes))
         )
 
     async def status(self) -> Status:
-        """Status byte and the interlock of each axis."""
+        """Return the status words: the status byte, and the interlock of each axis."""
         byte = await self._ask(acutrol.STATUS_QUERY, lambda a: acutrol.status_byte(self._dialect, a))
         bits = tuple(acutrol.STATUS_BITS.get(n, f"bit {n}") for n in range(8) if byte >> n & 1)
         words = [StatusWord("*stb?", str(byte), bits)]
@@ -92,7 +94,9 @@ class AcutrolLink:
         return tuple(words)
 
     async def require_closed(self) -> Status:
-        """Read the interlocks. Raises `DeviceFault` where one is not closed; none is reset or closed here."""
+        """Read the interlocks and return the status. Raises `DeviceFault` where one is not closed; none is reset or
+        closed here.
+        """
         status = await self.status()
         for word in status:
             if word.name.startswith("interlock") and word.raw != "closed":
@@ -116,7 +120,9 @@ class AcutrolLink:
             self._same(f"{quantity} limit of axis {axis} in {mode} mode", value, found)
 
     async def demand(self, kind: Literal["position", "rate"], index: int, value: float) -> None:
-        """Load a demand of an axis, and read it back."""
+        """Load a demand of an axis (position [deg] or rate [deg/s]), and read it back. Raises `DeviceFault` where it
+        reads otherwise.
+        """
         axis = self.axes[index]
         make = acutrol.position_demand if kind == "position" else acutrol.rate_demand
         await self._set(make(axis, value))
@@ -129,7 +135,9 @@ class AcutrolLink:
         await self._set(acutrol.oscillator_demand(self.axes[index], amplitude_deg, frequency_hz, 0.0))
 
     async def mode(self, mode: Mode, indices: Sequence[int] = (0, 1, 2)) -> None:
-        """Set the mode of some axes at which a loaded demand acts, and read it back; an axis in it is left alone."""
+        """Set the mode of some axes at which a loaded demand acts, and read it back; an axis in it is left alone.
+        Raises `DeviceFault`.
+        """
         for index in indices:
             axis = self.axes[index]
             if is_mode(await self.mode_of(index), mode):
@@ -140,11 +148,11 @@ class AcutrolLink:
                 raise DeviceFault(f"axis {axis} of the turntable was set to {mode} mode and reads back {found}")
 
     async def mode_of(self, index: int) -> str:
-        """Mode of an axis, in lower case."""
+        """Return the mode of an axis, in lower case, as the controller says it."""
         return await self._word(acutrol.mode_query(self.axes[index]))
 
     def close(self) -> None:
-        """Drop the line to the table."""
+        """Drop the line to the table, without waiting."""
         self._line.close()
 
     async def _set(self, statement: str) -> None:
@@ -194,5 +202,5 @@ class AcutrolLink:
 
 
 def is_mode(word: str, mode: Mode) -> bool:
-    """True if a controller's word names a mode; that of the synthesizer was seen in its short form alone."""
+    """Return whether a controller's word names a mode; that of the synthesizer was seen in its short form alone."""
     return word.startswith(acutrol.MODES["synthesis"]) if mode == "synthesis" else word == mode

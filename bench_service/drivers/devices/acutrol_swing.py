@@ -31,19 +31,23 @@ BACK_S = 1.0
 
 
 class SwingingTable(WatchedTable):
-    """Table whose sinusoids are begun in the synthesizer's mode and ended by braking in rate mode."""
+    """ACUTROL table whose sinusoids are begun in the synthesizer's mode and ended by braking in rate mode."""
 
     def __init__(self, section: AcutrolSection, context: DriverContext) -> None:
         super().__init__(section, context)
         self._traced = NO_TRACE
 
     def trace(self) -> EncoderTrace:
-        """Take the readings of a sinusoid; see the port. Each is timed by the middle of its request."""
+        """Return the encoder readings of the sinusoid since the last call; waits on no line. Each is timed by the
+        middle of its request. Implements `Turntable.trace`.
+        """
         taken, self._traced = self._traced, NO_TRACE
         return taken
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
-        """Begin a sinusoid of one axis; see the port. It is watched, traced and ended from here on."""
+        """Begin a sinusoid of one axis and return; it is watched, traced and ended from here on. Implements
+        `Turntable.command_sinusoid`.
+        """
         index, demand = AXES.index(sinusoid.axis), self._begin()
         try:
             states = await self._require_ready()

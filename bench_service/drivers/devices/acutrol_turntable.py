@@ -27,7 +27,9 @@ LEAVE_S = 0.5
 
 
 class AcutrolTurntable(SwingingTable):
-    """Table whose every motion is watched by its encoders. A cancelled motion continues to its end by itself."""
+    """Three-axis table on an ACUTROL controller, whose every motion is watched by its encoders. A cancelled motion
+    continues to its end by itself.
+    """
 
     async def connect(self) -> Found:
         """Make the line, identify, read status and factory limits; see `WireDevice`."""
@@ -36,11 +38,11 @@ class AcutrolTurntable(SwingingTable):
         return Found(identity, await self._link.status(), self._link.own)
 
     async def identify(self) -> DeviceIdentity:
-        """Ask for the identity; see the port."""
+        """Ask for maker, model, serial and firmware, and return them."""
         return await self._link.identify()
 
     async def read(self) -> TableReading:
-        """Read encoders and status words; see the port."""
+        """Return encoder angles and rates, whether the table moves, and status words. Implements `Turntable.read`."""
         states, status = await self._states(), await self._link.status()
         moving = self._under_way() or any(abs(s.rate_deg_s) > self._section.rest_rate_deg_s for s in states)
         outer, middle, inner = (s.rate_deg_s for s in states)
@@ -48,7 +50,9 @@ class AcutrolTurntable(SwingingTable):
         return TableReading(self._clock.now_s(), angles, moving, status, rates_deg_s=(outer, middle, inner))
 
     async def move_to(self, angles: TableAngles) -> None:
-        """Move all axes, settle; see the port."""
+        """Move all axes and wait until they have settled. Raises `OutOfRange` before anything moves, `NotSettled`,
+        `DeviceFault`. Implements `Turntable.move_to`.
+        """
         self._require_allowed(declared(self._section).violations(angles))
         demand = self._begin()
         try:
@@ -63,7 +67,9 @@ class AcutrolTurntable(SwingingTable):
             self._end(demand)
 
     async def command_turn(self, turn: Turn) -> None:
-        """Begin whole turns of one axis; see the port. They are followed from here on, while time passes elsewhere."""
+        """Begin whole turns of one axis and return; they are followed from here on, while time passes elsewhere.
+        Implements `Turntable.command_turn`.
+        """
         index, demand = AXES.index(turn.axis), self._begin()
         rate = turn.rate_deg_s if turn.turns > 0 else -turn.rate_deg_s
         start = await self._begin_rate(
@@ -72,7 +78,9 @@ class AcutrolTurntable(SwingingTable):
         self._turning = asyncio.create_task(self._follow(turn, index, start, demand))
 
     async def command_rate(self, rate: ConstantRate) -> None:
-        """Begin a constant rate of one axis; see the port. It is watched and ended from here on."""
+        """Begin a constant rate of one axis and return; it is watched and ended from here on. Implements
+        `Turntable.command_rate`.
+        """
         index, demand = AXES.index(rate.axis), self._begin()
         start = await self._begin_rate(
             index, rate.rate_deg_s, rate.ramp_s, demand, lambda bench, here: bench.rate_violations(here, rate)
@@ -105,7 +113,9 @@ class AcutrolTurntable(SwingingTable):
             raise
 
     async def settle(self) -> None:
-        """Wait for the end of the commanded turns; see the port."""
+        """Wait for the end of the commanded motion. Raises `NotSettled`, and `Stopped` where it was stopped. Implements
+        `Turntable.settle`.
+        """
         if (turning := self._turning) is not None:
             await asyncio.wait([turning])
             if self._turning is turning:
@@ -117,7 +127,9 @@ class AcutrolTurntable(SwingingTable):
             raise NotSettled("the table moves although this service commanded no motion")
 
     async def make_safe(self) -> None:
-        """Ramp down to rest and hold, or with the servo off as `on_safe` says; see the port."""
+        """Ramp down to rest and hold, or with the servo off as `on_safe` says, and wait until that is read back.
+        Implements `Turntable.make_safe`.
+        """
         self._demand += 1
         self._busy = False
         if (turning := self._turning) is not None:
@@ -165,7 +177,7 @@ class AcutrolTurntable(SwingingTable):
         self._link.close()
 
     def restore(self, angles: TableAngles) -> None:
-        """Take up the unwrapped angles that were remembered, before the first reading of an encoder of one turn."""
+        """Take over the unwrapped angles that were remembered, before the first reading of an encoder of one turn."""
         for count, angle in zip(self._counts, (angles.outer_deg, angles.middle_deg, angles.inner_deg), strict=True):
             count.restore(angle)
 

@@ -1,4 +1,6 @@
-"""Watching of an ACUTROL table by its encoders: states, rest, one demand at a time, what took over from what."""
+"""Watching of an ACUTROL table by its encoders: states, rest, and one demand at a time, of which a newer one supersedes
+an older.
+"""
 
 import asyncio
 import logging
@@ -26,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 class WatchedTable:
-    """Table whose state is what its encoders say; knows no verb of the port."""
+    """ACUTROL table whose state is what its encoders say; has no verb of `Turntable` yet, base of `SwingingTable`."""
 
     def __init__(self, section: AcutrolSection, context: DriverContext) -> None:
         self._section, self._clock = section, context.clock

@@ -47,7 +47,7 @@ class Ascii2Section(WireChamber):
 
     @property
     def layout(self) -> Layout:
-        """Layout of the lines. Raises `ValueError`."""
+        """Layout of the lines that the section describes. Raises `ValueError` for a layout that contradicts itself."""
         return Layout(
             self.bus_address,
             self.analogue,
@@ -60,7 +60,7 @@ class Ascii2Section(WireChamber):
 
 
 class Ascii2Chamber:
-    """Chamber whose every write sets all fields: it is read, changed in one place, and written."""
+    """Chamber over ASCII-2, whose every write sets all fields: it is read, changed in one place, and written."""
 
     def __init__(self, section: Ascii2Section, context: DriverContext) -> None:
         self._section, self._clock, self._layout = section, context.clock, section.layout
@@ -82,18 +82,20 @@ class Ascii2Chamber:
         return Found(await self.identify(), reading.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Shape of its state: the protocol has no identity of its own."""
+        """Return the shape of the chamber's state as its model: the protocol has no identity of its own."""
         return await self._line.ask(self._greeting.identity)
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
-        """Go to an air temperature; see the port."""
+        """Set air temperature and ramp, start, and read back. Raises `OutOfRange`, `DeviceFault` for an open door or an
+        alarm. Implements `Chamber.command`.
+        """
         require_allowed(self.limits, temperature_c, ramp_c_min)
         state = await self._line.ask(self._state)
         require_fit(state.bit(self._layout.door), state.bit(self._layout.alarm))
         await self._lead(state, temperature_c, ramp_c_min, start=True)
 
     async def read(self) -> ChamberReading:
-        """Read the chamber; see the port."""
+        """Return air temperature, set point (None: it stands still), door and alarm. Implements `Chamber.read`."""
         layout, state = self._layout, await self._line.ask(self._state)
         running = state.bit(layout.start)
         target = state.set_points[layout.temperature] if running else None
@@ -110,7 +112,9 @@ class Ascii2Chamber:
         )
 
     async def make_safe(self) -> None:
-        """Lead a running chamber as `on_safe` says; see the port."""
+        """Bring a running chamber into the state that `on_safe` names; one that stands still gets no demand. Implements
+        `Chamber.make_safe`.
+        """
         state = await self._line.ask(self._state)
         if not state.bit(self._layout.start):
             return

@@ -10,7 +10,7 @@ from procedures.bench.errors import DeviceFault, OutOfRange
 
 
 def limits_of(bounds: ChamberBounds, own: tuple[Bound, ...] = ()) -> ChamberLimits:
-    """Limits of demands: the narrower of the section's and the chamber's own."""
+    """Return the limits of demands: the narrower of the section's and the chamber's own."""
     found = {bound.field: bound for bound in own}
 
     def held(name: str) -> float:
@@ -22,7 +22,7 @@ def limits_of(bounds: ChamberBounds, own: tuple[Bound, ...] = ()) -> ChamberLimi
 
 
 def require_allowed(limits: ChamberLimits, temperature_c: float, ramp_c_min: float) -> None:
-    """Check a demand against the limits. Raises `OutOfRange`."""
+    """Check temperature and ramp of a demand against the limits. Raises `OutOfRange`."""
     if not (isfinite(temperature_c) and limits.minimum_c <= temperature_c <= limits.maximum_c):
         raise OutOfRange(f"temperature_c = {temperature_c!r} is outside {limits.minimum_c:g} … {limits.maximum_c:g}")
     if not 0.0 < ramp_c_min <= limits.ramp_c_min:
@@ -30,7 +30,7 @@ def require_allowed(limits: ChamberLimits, temperature_c: float, ramp_c_min: flo
 
 
 def require_fit(door_open: bool, tripped: bool, words: str = "") -> None:
-    """Check that the chamber may be led anywhere. Raises `DeviceFault`; nothing is reset."""
+    """Check that the chamber may be commanded: door closed, no alarm. Raises `DeviceFault`; nothing is reset."""
     if tripped:
         raise DeviceFault(
             f"the chamber has switched itself off{f' ({words})' if words else ''}: a person must reset it"
@@ -40,7 +40,7 @@ def require_fit(door_open: bool, tripped: bool, words: str = "") -> None:
 
 
 def require_same(name: str, demanded: float, found: float, tolerance: float) -> None:
-    """Check a value that was read back. Raises `DeviceFault`."""
+    """Check a value that was read back against the demanded one. Raises `DeviceFault` beyond the tolerance."""
     if abs(found - demanded) > tolerance:
         raise DeviceFault(f"the chamber was set to {name} {demanded:g} and reads back {found:g}")
 
@@ -51,9 +51,9 @@ async def obey_on_safe(
     end: Callable[[], Awaitable[object]],
     lead: Callable[[float, float], Awaitable[object]],
 ) -> None:
-    """Make a running chamber safe as its section's `on_safe` says: leave it, end its run, or lead it to ambient.
+    """Make a running chamber safe as its section's `on_safe` says: leave it, end its run, or command it to ambient.
 
-    `lead` takes a temperature [°C] and a ramp [°C/min]. One that stands still is not to be asked: it gets no demand.
+    `lead` takes a temperature [°C] and a ramp [°C/min]. Not to be called for one that stands still: it gets no demand.
     """
     if section.on_safe == "off":
         await end()

@@ -21,7 +21,7 @@ class FramedSection(WireUnitLink):
 
 
 class FramedUnit(UnitRecordings):
-    """Unit that is only listened to: it says nothing of itself but its frames."""
+    """Unit that is only listened to: it reports nothing of itself but its frames."""
 
     def __init__(self, section: FramedSection, context: DriverContext) -> None:
         """Read the frame's file. Raises `Misconfigured`."""
@@ -46,7 +46,7 @@ class FramedUnit(UnitRecordings):
         return await self.found(await self.identify())
 
     async def identify(self) -> DeviceIdentity:
-        """Name of the frame's format: the unit reports nothing else."""
+        """Return the name of the frame's format as the model: the unit reports nothing else."""
         return DeviceIdentity(model=self._form.name)
 
     def close(self) -> None:

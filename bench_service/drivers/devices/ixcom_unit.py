@@ -25,7 +25,7 @@ class IxcomSection(WireUnitLink):
 
 
 class IxcomUnit(UnitRecordings):
-    """Unit whose rates are 32-bit floats; a recording holds counts of the declared scales."""
+    """Unit over iXCOM whose rates are 32-bit floats; a recording holds counts of the declared scales."""
 
     def __init__(self, section: IxcomSection, context: DriverContext) -> None:
         """Set up. Raises `Misconfigured` where the declared unit cannot be an iXCOM one."""
@@ -46,7 +46,9 @@ class IxcomUnit(UnitRecordings):
         return Found(self._identity, found.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Identity that the unit reported when its line was opened; see the port."""
+        """Return maker, part, serial and firmware as read when the channel was opened. Waits for the first frame; a
+        unit without power that never answered has an empty identity. Raises `Disconnected`.
+        """
         await self.found(self._identity)
         return self._identity
 

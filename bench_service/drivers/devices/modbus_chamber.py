@@ -33,7 +33,7 @@ class ModbusSection(WireChamber):
 
 
 class ModbusChamber:
-    """Chamber of which the map alone is known."""
+    """Chamber over Modbus, of which only the register map in the bench file is known."""
 
     def __init__(self, section: ModbusSection, context: DriverContext) -> None:
         self._section, self._clock, self._map = section, context.clock, section.registers
@@ -52,12 +52,14 @@ class ModbusChamber:
         return Found(await self.identify(), reading.status)
 
     async def identify(self) -> DeviceIdentity:
-        """A Modbus map names no maker: the device is what its address says."""
+        """Return an empty identity: a Modbus map names no maker, the device is what its address says."""
         await self._line.read(self._map.actual)
         return DeviceIdentity(model="Modbus chamber")
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
-        """Go to an air temperature; see the port. Ramp, then set point, then start, each read back."""
+        """Set ramp, then set point, then start, and read each back. Raises `OutOfRange`, `DeviceFault`. Implements
+        `Chamber.command`.
+        """
         require_allowed(self.limits, temperature_c, ramp_c_min)
         if self._map.ramp is None and ramp_c_min < self._map.own_ramp_c_min:
             raise DeviceFault(
@@ -70,7 +72,7 @@ class ModbusChamber:
             await self._run(True)
 
     async def read(self) -> ChamberReading:
-        """Read the chamber; see the port."""
+        """Return air temperature, set point (None: it stands still), door and alarm. Implements `Chamber.read`."""
         air, target = await self._line.read(self._map.actual), await self._line.read(self._map.set_point)
         running = await self._line.read_bit(self._map.running)
         door = self._map.door is not None and await self._line.read_bit(self._map.door)
@@ -80,7 +82,9 @@ class ModbusChamber:
         return ChamberReading(self._clock.now_s(), air, None, target if running else None, door, alarm, status=status)
 
     async def make_safe(self) -> None:
-        """Lead a running chamber as `on_safe` says; see the port."""
+        """Bring a running chamber into the state that `on_safe` names; one that stands still gets no demand. Implements
+        `Chamber.make_safe`.
+        """
         if await self._line.read_bit(self._map.running):
             await obey_on_safe(self._section, self.limits, lambda: self._run(False), self._lead)
 

@@ -37,7 +37,7 @@ class ScpiSection(WireSupply):
 
 
 class ScpiSupply:
-    """Power supply that is asked for its errors after every set, and whose settings are read back."""
+    """Power supply over SCPI, which is asked for its errors after every set, and whose settings are read back."""
 
     def __init__(self, section: ScpiSection, context: DriverContext) -> None:
         self._section, self._clock = section, context.clock
@@ -59,11 +59,13 @@ class ScpiSupply:
         return Found(await self.identify(), reading.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Ask for the identity; see the port."""
+        """Ask for maker, model, serial and firmware, and return them."""
         return await self._line.ask(self._greeting.identity)
 
     async def set_output(self, voltage_v: float, current_a: float) -> None:
-        """Set voltage and current limit; see the port. The lower setting of the current comes first."""
+        """Set voltage and current limit, and read them back; the lower setting of the current comes first. Raises
+        `OutOfRange`, `DeviceFault`. Implements `Supply.set_output`.
+        """
         if violations := self.limits.violations(voltage_v, current_a):
             raise OutOfRange("; ".join(violations))
         await self._set(scpi.set_current(self._dialect, current_a), f"a current limit of {current_a:g} A")
@@ -76,7 +78,9 @@ class ScpiSupply:
         self._wanted = (voltage_v, current_a)
 
     async def switch_on(self) -> None:
-        """Switch the output on; see the port. One that has tripped stays off: some clear a trip by that."""
+        """Switch the output on and check that it is. Raises `DeviceFault`. One that has tripped stays off: some
+        supplies clear a trip by that. Implements `Supply.switch_on`.
+        """
         if await self._tripped():
             raise DeviceFault("the supply's protection has tripped: a person must reset it")
         if await self._query("OUTP?", scpi.switch):
@@ -85,12 +89,14 @@ class ScpiSupply:
         await self._switch(True)
 
     async def switch_off(self) -> None:
-        """Switch the output off; see the port."""
+        """Switch the output off, if it is on, and check that it is off. Implements `Supply.switch_off`."""
         if await self._query("OUTP?", scpi.switch):
             await self._switch(False)
 
     async def read(self) -> SupplyReading:
-        """Measure the output and read its state; see the port."""
+        """Return measured voltage and current, the settings, whether the output is on, and status words. Implements
+        `Supply.read`.
+        """
         on = await self._query("OUTP?", scpi.switch)
         tripped = await self._tripped()
         set_v, set_a = await self._query("VOLT?", scpi.value), await self._query("CURR?", scpi.value)
@@ -106,7 +112,7 @@ class ScpiSupply:
         return SupplyReading(self._clock.now_s(), on, voltage, current, mode == "CC", tripped, set_v, set_a, status)
 
     async def make_safe(self) -> None:
-        """Switch the output off; see the port."""
+        """Switch the output off and check that it is off. Implements `Supply.make_safe`."""
         await self.switch_off()
 
     def close(self) -> None:

@@ -44,7 +44,7 @@ class SimservSection(WireChamber):
 
 
 class SimservChamber:
-    """Chamber whose set point is the final one: the controller makes the ramp by its gradients."""
+    """Chamber over SIMSERV, whose set point is the final one: the controller makes the ramp by its gradients."""
 
     def __init__(self, section: SimservSection, context: DriverContext) -> None:
         self._section, self._clock = section, context.clock
@@ -75,13 +75,15 @@ class SimservChamber:
         return Found(await self.identify(), reading.status, self._own)
 
     async def identify(self) -> DeviceIdentity:
-        """Ask for type, serial and software; see the port."""
+        """Ask for type, serial and software version, and return them."""
         model = await self._ask(Command.INFORMATION, [str(Information.TYPE.value)], simserv.text_of)
         serial = await self._ask(Command.INFORMATION, [str(Information.SERIAL.value)], simserv.text_of)
         return DeviceIdentity("", model, serial)
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
-        """Go to an air temperature; see the port. Gradients, then the set point, then the start, each read back."""
+        """Set gradients, then the set point, then start, and read each back. Raises `OutOfRange`, `DeviceFault`.
+        Implements `Chamber.command`.
+        """
         require_allowed(limits_of(self._section.limits), temperature_c, ramp_c_min)
         status = await self._status()  # greets, and so reads the chamber's own limits
         require_allowed(self.limits, temperature_c, ramp_c_min)
@@ -91,7 +93,7 @@ class SimservChamber:
             await self._run(True)
 
     async def read(self) -> ChamberReading:
-        """Read the chamber; see the port."""
+        """Return air temperature, set point (None: it stands still), door and alarm. Implements `Chamber.read`."""
         status = await self._status()
         air = await self._ask(Command.ACTUAL, [self._variable], simserv.number_of)
         target = await self._ask(Command.GET_SET_POINT, [self._variable], simserv.number_of)
@@ -106,7 +108,9 @@ class SimservChamber:
         )
 
     async def make_safe(self) -> None:
-        """Lead a running chamber as `on_safe` says; see the port. One that stands still gets no demand."""
+        """Bring a running chamber into the state that `on_safe` names; one that stands still gets no demand. Implements
+        `Chamber.make_safe`.
+        """
         status = await self._status()
         if status & ChamberStatus.RUNNING:
             await obey_on_safe(self._section, self.limits, lambda: self._run(False), self._lead)

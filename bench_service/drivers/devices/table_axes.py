@@ -15,7 +15,9 @@ LONGEST_STEP_DEG = 120.0
 
 
 def declared(section: WireTurntable) -> BenchDescription:
-    """The table's part of a bench description, by which demands are checked; its site is not used."""
+    """Return a bench description with the table's limits from a section, by which demands are checked; its site is not
+    used.
+    """
 
     def limits(axis: Axis) -> AxisLimits:
         return AxisLimits(
@@ -28,13 +30,13 @@ def declared(section: WireTurntable) -> BenchDescription:
 
 
 def angles_of(values: Sequence[float]) -> TableAngles:
-    """Table angles of three numbers, outer, middle, inner [deg]."""
+    """Return the table angles of three numbers, outer, middle, inner [deg]."""
     outer, middle, inner = values
     return TableAngles(outer, middle, inner)
 
 
 def wrapped(angle_deg: float) -> float:
-    """The angle within -180 … 180 [deg]."""
+    """Return the angle within -180 … 180 [deg]."""
     return angle_deg - 360.0 * round(angle_deg / 360.0)
 
 
@@ -51,7 +53,7 @@ class TurnCount:
     known: bool = field(default=False)
 
     def read(self, encoder_deg: float) -> float:
-        """The unwrapped angle by a new reading [deg]. The first one is taken as it is."""
+        """Return the unwrapped angle by a new reading [deg]. The first one is taken as it is."""
         if not self.counts or not self.known:
             self.angle_deg = encoder_deg
         else:
@@ -60,7 +62,7 @@ class TurnCount:
         return self.angle_deg
 
     def restore(self, angle_deg: float) -> None:
-        """Take up a remembered unwrapped angle; the next reading corrects it within half a turn."""
+        """Take over a remembered unwrapped angle; the next reading corrects it within half a turn."""
         self.angle_deg, self.known = angle_deg, True
 
 
@@ -80,7 +82,9 @@ class TurnProgress:
     turned_deg: float = 0.0
 
     def read(self, encoder_deg: float, now_s: float, less_deg: float = 0.0) -> float:
-        """Angle turned by a new reading, signed [deg]. `less_deg`: how much less than the rate's was turned since."""
+        """Return the angle turned so far, by a new reading, signed [deg]. `less_deg`: how much less than the rate's was
+        turned since.
+        """
         due = self.turned_deg + self.rate_deg_s * (now_s - self.since_s) - less_deg
         self.turned_deg = due + wrapped(encoder_deg - self.start_deg - due)
         self.since_s = now_s
@@ -88,7 +92,9 @@ class TurnProgress:
 
 
 def steps(start_deg: Sequence[float], end_deg: Sequence[float], counted: Sequence[bool]) -> list[list[float]]:
-    """Angles to go through, the last one `end_deg`: no axis with an encoder of one turn by more than a step at once."""
+    """Return the angles of a move from step to step, each of three axes, the last one `end_deg`: no axis with an
+    encoder of one turn by more than a step at once.
+    """
     longest = max(
         (abs(end - start) for start, end, counts in zip(start_deg, end_deg, counted, strict=True) if counts),
         default=0.0,

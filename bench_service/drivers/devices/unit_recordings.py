@@ -15,15 +15,22 @@ from procedures.bench.imu import Stream
 from procedures.core.recording import Channel, Quantity, Station
 
 HELD_S = 30.0
-"""Length of data that may wait to be recorded [s of the unit]; beyond it a recording ends."""
+"""Length of data that may wait to be recorded [s, real time]; beyond it a recording ends."""
+MOST_HELD = 1_000_000
+"""Largest number of frames that may wait, at the time factor of served simulators."""
 BLOCK_S = 0.25
 """Length of a block [s of the unit]."""
+READY_S = 2.0
+"""Longest wait for a unit's first valid frame after its power-up [s]; one that needs more is given it by a procedure's
+`settle_s`."""
 LOOK_S = 0.01
 """Pause between two looks at what has come [s]."""
 
 
 class UnitRecordings:
-    """Data link of a unit over a stream of frames: implements `procedures.bench.imu.Imu` but for its identity."""
+    """Base of the data links of real units, over a stream of frames: implements `procedures.bench.imu.Imu` but for its
+    identity.
+    """
 
     def __init__(
         self,
@@ -41,7 +48,9 @@ class UnitRecordings:
         self._launched_s: float | None = None
 
     async def found(self, identity: DeviceIdentity) -> Found:
-        """Wait for the first frame where the unit has power. Raises `Disconnected`."""
+        """Wait for the first frame where the unit has power, and return identity and status. Raises `Disconnected`
+        where none comes in time.
+        """
         self._stream.begin()
         until = wall_clock.monotonic_s() + self._answer_s
         while self._context.powered() and self._stream.last_frame_s == 0.0:
@@ -50,12 +59,24 @@ class UnitRecordings:
             await pause_async(LOOK_S)
         return Found(identity, self.status())
 
+    async def ready(self) -> None:
+        """Wait for a frame that says that its data are valid, at most `READY_S`; a recording refuses those that do not.
+
+        For a unit that was switched on just now. Raises nothing: the recording has the words for what is wrong.
+        """
+        self._stream.begin()
+        since = wall_clock.monotonic_s()
+        while self._stream.last_valid_s < since and wall_clock.monotonic_s() < since + READY_S:
+            await pause_async(LOOK_S)
+
     def status(self) -> Status:
-        """Status words of the newest frame; see the port."""
+        """Return the status words of the newest frame. Implements `Imu.status`."""
         return tuple(StatusWord(name, raw, bits) for name, raw, bits in self._stream.words())
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording with the next frame that comes; see the port."""
+        """Begin a recording with the next frame that comes, and return its stream of blocks. Raises `NotPowered`,
+        `OutOfRange`. Implements `Imu.record`.
+        """
         if not 0.0 <= duration_s < float("inf"):
             raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")
         if not self._context.powered():
@@ -65,7 +86,7 @@ class UnitRecordings:
             raise OutOfRange("station.temperatures = True: the frames of this unit hold no temperature")
         columns = None if warm or len(self._inertial) == len(self._all) else self._inertial
         self._stream.begin()
-        tape = Tape(max(1, round(HELD_S * self.rate_hz)))
+        tape = Tape(max(1, min(MOST_HELD, round(HELD_S * self.rate_hz * self._context.time_factor))))
         self._stream.record(tape)
         samples = round(duration_s * self.rate_hz)
         blocks = self._blocks(tape, samples, columns)

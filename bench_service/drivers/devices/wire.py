@@ -1,4 +1,6 @@
-"""Parts that drivers of devices on a wire share: the greeting of a new line, and words for a refusal."""
+"""Common parts of drivers of devices on a wire: the greeting of a new line, its times, and the sentence for a
+refusal.
+"""
 
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeVar
@@ -42,13 +44,13 @@ class Greeting:
 
 
 def line_times(section: Wire, after_demand_s: float = 0.0) -> LineTimes:
-    """Times of a line by its section: a verb's request may take a new connection and a second try."""
+    """Return the times of a line by its section: a verb's request may take a new connection and a second try."""
     deadline = section.connect_s + 2.0 * section.answer_s + after_demand_s
     return LineTimes(section.answer_s, deadline, section.connect_s, after_demand_s)
 
 
 async def accepted(asked: Awaitable[T], device: str, name: str) -> T:
-    """Wait for an answer. Raises `DeviceFault` with the device's words where it refuses."""
+    """Wait for a device's answer and return it. Raises `DeviceFault` with the device's words where it refuses."""
     try:
         return await asked
     except Refusal as refusal:

@@ -14,7 +14,7 @@ SERIAL_FORMAT = re.compile(r"^[5-8][NEO][12]$")
 
 @dataclass(frozen=True)
 class Address:
-    """Address of one device's line."""
+    """Address of one device's line, in its parts: scheme, host and port, or path and baud rate."""
 
     scheme: Literal["tcp", "udp", "serial"]
     host: str = ""

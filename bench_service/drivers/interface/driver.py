@@ -1,4 +1,4 @@
-"""A driver of one kind of device: the section of a bench file that it reads, and the port that it makes of it.
+"""A driver of one kind of device: the section of a bench file that it reads, and the device that it makes of it.
 
 Rules of a driver (docs/add-a-device.md has them all):
 
@@ -51,6 +51,8 @@ class DriverContext:
     """Writes an event into the devices' journal, such as ("turntable.status", {"word": …}): for links lost and made,
     status words that changed, frames that were lost. Waits for nothing.
     """
+    time_factor: float = 1.0
+    """Bench seconds in a real second: other than 1 for served simulators alone, whose data come faster by as much."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class Found:
 
 
 class WireDevice(Device, Protocol):
-    """A device that a driver makes: a port of `procedures.bench` with two more verbs."""
+    """A device that a driver makes: an interface of `procedures.bench` with two more verbs, to connect and to close."""
 
     async def connect(self) -> Found:
         """Make the link if there is none, identify the device, read its status and limits. Commands nothing.
@@ -93,7 +95,7 @@ class WireDevice(Device, Protocol):
 
 @dataclass(frozen=True)
 class DeviceDriver(Generic[S]):
-    """A driver as the registry knows it."""
+    """A driver as the registry knows it: kind, name, model of its section, and the function that makes the device."""
 
     kind: Kind
     name: str
@@ -105,14 +107,14 @@ class DeviceDriver(Generic[S]):
 
 
 def narrowest(declared: float, own: float | None, lower: bool) -> float:
-    """The narrower of a declared limit and the device's own; None: the device does not report it."""
+    """Return the narrower of a declared limit and the device's own; `own` None: the device does not report it."""
     if own is None:
         return declared
     return max(declared, own) if lower else min(declared, own)
 
 
 def differences(section: DeviceSection, bounds: Sequence[Bound]) -> tuple[str, ...]:
-    """Sentences about limits in which section and device differ, each with the one that holds."""
+    """Return sentences about limits in which section and device differ, each with the one that holds."""
     found: list[str] = []
     for bound in bounds:
         declared = _value(section, bound.field)
@@ -123,9 +125,8 @@ def differences(section: DeviceSection, bounds: Sequence[Bound]) -> tuple[str, .
 
 
 def narrowed(section: S, bounds: Sequence[Bound]) -> S:
-    """The section with the narrower of its limits and the device's own.
-
-    Raises `ValueError` where a bound names no number of the section.
+    """Return the section with the narrower of its limits and the device's own. Raises `ValueError` where a bound names
+    no number of the section.
     """
     for bound in bounds:
         section = _with(section, bound.field.split("."), bound)

@@ -26,7 +26,7 @@ SHIPPED: dict[tuple[Kind, str], str] = {
 
 
 def driver(kind: Kind, name: str) -> DeviceDriver[Any]:
-    """Import a driver by its kind and name. Raises `Misconfigured` naming the drivers of this kind."""
+    """Import and return a driver by its kind and name. Raises `Misconfigured` naming the drivers of this kind."""
     shipped = SHIPPED.get((kind, name))
     if shipped is not None:
         module, _, attribute = shipped.partition(":")
@@ -42,7 +42,9 @@ def driver(kind: Kind, name: str) -> DeviceDriver[Any]:
 
 
 def names(kind: Kind) -> tuple[str, ...]:
-    """Names of all drivers of a kind, "simulated" first; one of an installed package that fails to load is left out."""
+    """Return the names of all drivers of a kind, "simulated" first; one of an installed package that fails to load is
+    left out.
+    """
     found = {name for of_kind, name in SHIPPED if of_kind == kind}
     for entry in entry_points(group=GROUP):
         try:

@@ -19,7 +19,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Section(BaseModel):
-    """Table of a bench file."""
+    """Base of all tables of a bench file: unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -34,7 +34,7 @@ class Certificate(Section):
 
 
 class DeviceSection(Section):
-    """Fields of every device."""
+    """Fields of every device of a bench file: its driver, and its certificate."""
 
     driver: str = Field(default=SIMULATED, pattern=r"^[a-z][a-z0-9_-]*$")
     """Name of the driver; "simulated": the device of the simulated bench."""
@@ -42,7 +42,7 @@ class DeviceSection(Section):
 
 
 class Wire(Section):
-    """Fields of every device on a wire: base of the sections of real drivers."""
+    """Fields of every device on a wire, its address and its time-outs: base of the sections of real drivers."""
 
     address: AddressText
     answer_s: Seconds = 2.0
@@ -86,7 +86,7 @@ class Accuracy(Section):
 
 
 class TurntableSection(DeviceSection):
-    """Section ``[turntable]`` of a bench file."""
+    """Section ``[turntable]`` of a bench file: limits of the axes, accuracy, state when made safe."""
 
     outer: Axis | None = None
     middle: Axis | None = None
@@ -98,7 +98,7 @@ class TurntableSection(DeviceSection):
     """State after the axes have come to rest: held by the servo, or with the servo off."""
 
     def turn_extra_s(self, factor: float) -> float:
-        """Time that whole turns take beyond their own, for demands at a time factor [s, bench time]."""
+        """Return the time that whole turns take beyond their own, for demands at a time factor [s, bench time]."""
         return 0.0
 
 
@@ -112,7 +112,7 @@ class WireTurntable(TurntableSection, Wire):
 
 
 class ChamberBounds(Section):
-    """Limits of the chamber."""
+    """Limits of the chamber's demands, and its ambient temperature."""
 
     minimum_c: Finite
     maximum_c: Finite
@@ -134,7 +134,7 @@ class ChamberTrust(Section):
 
 
 class ChamberSection(DeviceSection):
-    """Section ``[chamber]`` of a bench file."""
+    """Section ``[chamber]`` of a bench file: limits, accuracy, limiter, state when made safe."""
 
     limits: ChamberBounds | None = None
     accuracy: ChamberTrust | None = None
@@ -170,7 +170,7 @@ class SupplyBounds(Section):
 
 
 class SupplySection(DeviceSection):
-    """Section ``[supply]`` of a bench file."""
+    """Section ``[supply]`` of a bench file: limits, nominal setting, state when made safe."""
 
     limits: SupplyBounds | None = None
     on_safe: Literal["off"] = "off"
@@ -183,7 +183,7 @@ class WireSupply(SupplySection, Wire):
 
 
 class UnitLinkSection(DeviceSection):
-    """Section ``[unit_link]`` of a bench file."""
+    """Section ``[unit_link]`` of a bench file: the unit's data link, simulated or real."""
 
 
 class WireUnitLink(UnitLinkSection, Wire):
@@ -199,7 +199,7 @@ class CurrentBounds(Section):
 
 
 class CurrentSourceSection(DeviceSection):
-    """Section ``[current_source]`` of a bench file."""
+    """Section ``[current_source]`` of a bench file: limits, accuracy, state when made safe."""
 
     limits: CurrentBounds | None = None
     on_safe: Literal["off"] = "off"
@@ -213,6 +213,11 @@ class WireCurrentSource(CurrentSourceSection, Wire):
 
 class OperatorSection(DeviceSection):
     """Section ``[operator]``: "simulated", or "asked" for a person who is asked by a prompt."""
+
+    address: AddressText | None = None
+    """Address of the person of served simulators (`bench simulate`), who sets the simulated unit by hand: at once with
+    "simulated", after the person who is asked with "asked". None: no simulator is served, or none is set by hand.
+    """
 
 
 class EnvironmentSection(DeviceSection):

@@ -25,7 +25,7 @@ AGAIN_S = 0.1
 
 @dataclass(frozen=True)
 class Request(Generic[T]):
-    """Bytes to send, and the meaning of the answer."""
+    """A request to a device: the bytes to send, and the function that reads the answer."""
 
     data: bytes
     name: str
@@ -40,7 +40,7 @@ class Request(Generic[T]):
 
 @dataclass(frozen=True)
 class LineTimes:
-    """Times of a line [s]."""
+    """Time-outs of a line [s]: of an answer, of a whole request, of a connection, and of a rest after a demand."""
 
     answer_s: float = 2.0
     """Longest time from a request to its whole answer."""
@@ -52,13 +52,13 @@ class LineTimes:
 
 
 class Framer(Protocol):
-    """Where one answer ends; see `framing`."""
+    """Finds where one answer ends in what has arrived. Interface; see `framing`."""
 
     def take(self, buffer: bytearray) -> bytes | None: ...
 
 
 class Greeting(Protocol):
-    """First words on each new connection: identity, then status."""
+    """First requests on each new connection: identity, then status. Interface of the drivers."""
 
     @property
     def identity(self) -> Request[Any]:
@@ -71,7 +71,7 @@ class Greeting(Protocol):
 
 
 class Ask(Protocol):
-    """Send a request on the new connection, without a second try."""
+    """Function that sends a request on the new connection, without a second try, and returns the answer's value."""
 
     def __call__(self, request: Request[T]) -> T: ...
 
@@ -82,7 +82,9 @@ class _Lost(Exception):
 
 @dataclass
 class LineCounts:
-    """Counts of what has happened to a line; for tests, metrics and messages."""
+    """Counts of what has happened to a line: requests, connections, silences, cuts, surplus bytes; for tests, metrics
+    and messages.
+    """
 
     requests: int = 0
     connections: int = 0
@@ -93,7 +95,9 @@ class LineCounts:
 
 
 class Exchange:
-    """Conversation with one device, which reconnects where that is allowed."""
+    """Requests and answers with one device over one line, which reconnects where that is allowed. Blocking, for one
+    thread.
+    """
 
     def __init__(self, device: str, address: Address, framer: Framer, greeting: Greeting, times: LineTimes) -> None:
         self.device, self.address, self.times = device, address, times
@@ -107,7 +111,9 @@ class Exchange:
         self.counts = LineCounts()
 
     def ask(self, request: Request[T], until: float) -> T:
-        """Ask until a moment of the monotonic clock. Raises `Disconnected`, `DeviceBusy`, `Refusal`."""
+        """Send a request and wait for the value of its answer, until a moment of the monotonic clock. Raises
+        `Disconnected`, `DeviceBusy`, `Refusal`.
+        """
         self._connect(until)
         try:
             return self._once(request, until)

@@ -32,7 +32,7 @@ Opening = Callable[[Transport], StreamDecoder]
 
 @dataclass
 class Tape:
-    """Frames that a recording has not read yet."""
+    """Frames that one recording has not read yet, at most `most` of them, and the failure that ended it."""
 
     most: int
     """Largest number of frames that may wait."""
@@ -43,7 +43,7 @@ class Tape:
     """True once it has got a frame: what was lost before that is not lost to it."""
 
     def take(self, count: int) -> NDArray[np.int32]:
-        """Take the oldest frames, at most `count`."""
+        """Remove the oldest frames, at most `count`, and return their counts, (n, channels)."""
         parts: list[NDArray[np.int32]] = []
         while self.blocks and count > 0:
             block = self.blocks.popleft()
@@ -57,7 +57,9 @@ class Tape:
 
 
 class FrameStream:
-    """Listens to a unit from the first use on, and opens its line again where it is lost between two recordings."""
+    """Listens to a unit in a thread from the first use on, and opens its line again where it is lost between two
+    recordings.
+    """
 
     def __init__(
         self,
@@ -79,6 +81,8 @@ class FrameStream:
         """Number of frames that have come over all lines."""
         self.last_frame_s = 0.0
         """Moment of the newest frame on the monotonic clock [s]; 0 before the first one."""
+        self.last_valid_s = 0.0
+        """Moment of the newest frames of which the last one is valid [s]; 0 before the first ones."""
         self._newest: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
 
     @property
@@ -92,7 +96,7 @@ class FrameStream:
         return self._problem
 
     def begin(self) -> None:
-        """Begin to listen; idempotent. Raises `Disconnected` after `close`."""
+        """Start the thread that listens; idempotent. Raises `Disconnected` after `close`."""
         if self._closing.is_set():
             raise Disconnected(f"{self.named} was closed by the service")
         with self._lock:
@@ -101,16 +105,16 @@ class FrameStream:
                 self._thread.start()
 
     def words(self) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
-        """Status words of the newest frame."""
+        """Return the status words of the newest frame: name, text, names of the bits that are set."""
         return self._newest
 
     def record(self, tape: Tape) -> None:
-        """Give a recording the frames that come from now on."""
+        """Append the frames that come from now on to a recording's tape."""
         with self._lock:
             self._tapes.append(tape)
 
     def end(self, tape: Tape) -> None:
-        """End a recording; idempotent."""
+        """Append no more frames to a recording's tape; idempotent."""
         with self._lock:
             if tape in self._tapes:
                 self._tapes.remove(tape)
@@ -124,7 +128,7 @@ class FrameStream:
         self._fail(Disconnected(f"{self.named} was closed by the service"))
 
     def ended(self, within_s: float) -> bool:
-        """Wait for the thread after `close`; True if it has ended."""
+        """Wait for the thread after `close`, at most `within_s`; return True if it has ended."""
         if self._thread is not None:
             self._thread.join(within_s)
         return self._thread is None or not self._thread.is_alive()
@@ -168,7 +172,10 @@ class FrameStream:
             self._note("imu.frames_lost", {"why": why})
             self._fail(Disconnected(f"{self.named}: {why}"), begun_only=gap.at == 0)
         self._spoiled = 0
-        invalid = np.flatnonzero(decoder.invalid(decoded.status))
+        mask = decoder.invalid(decoded.status)
+        if not mask[-1]:
+            self.last_valid_s = self.last_frame_s
+        invalid = np.flatnonzero(mask)
         if len(invalid):
             at = int(invalid[0])
             words = ", ".join(f"{name} {raw}" for name, raw, _ in decoder.words(decoded.status[at]))

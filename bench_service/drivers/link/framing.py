@@ -7,12 +7,12 @@ LONGEST_ANSWER = 4096
 
 
 class NoFrame(ValueError):
-    """Bytes have arrived that cannot become an answer."""
+    """Raised where bytes have arrived that cannot become an answer."""
 
 
 @dataclass(frozen=True)
 class Framing:
-    """Answers of a text protocol: some bytes of any value, then text up to an ending."""
+    """Finds answers of a text protocol: some bytes of any value, then text up to an ending."""
 
     ending: bytes
     prefix_bytes: int = 0
@@ -23,7 +23,8 @@ class Framing:
             raise ValueError(f"{self!r}: the ending has 1 … 8 bytes, the prefix 0 … 64")
 
     def take(self, buffer: bytearray) -> bytes | None:
-        """Take one answer from the buffer, its ending left out, the prefix kept; None: it is not whole yet.
+        """Remove one answer from the buffer and return it, its ending left out, the prefix kept; None: it is not whole
+        yet.
 
         Raises `NoFrame` where more has arrived than the longest answer has.
         """
@@ -39,14 +40,14 @@ class Framing:
 
 @dataclass(frozen=True)
 class Frames:
-    """Answers of a binary protocol: a function finds the length of the first one."""
+    """Finds answers of a binary protocol, by a function that gives the length of the first one."""
 
     length: Callable[[bytes], int | None]
     """Length of the frame that begins the bytes; None: too little has come to say it. Raises `NoFrame`."""
     longest: int = LONGEST_ANSWER
 
     def take(self, buffer: bytearray) -> bytes | None:
-        """Take one frame from the buffer; None: it is not whole yet. Raises `NoFrame`."""
+        """Remove one frame from the buffer and return it; None: it is not whole yet. Raises `NoFrame`."""
         length = self.length(bytes(buffer[: self.longest]))
         if length is None or len(buffer) < length:
             if len(buffer) > self.longest:

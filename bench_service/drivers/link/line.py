@@ -43,7 +43,9 @@ class DeviceLine:
         return self._exchange.counts
 
     async def ask(self, request: Request[T], within_s: float | None = None) -> T:
-        """Ask and wait for the value of the answer. Raises `Disconnected`, `DeviceBusy`, `Refusal`."""
+        """Send a request and wait, without holding the loop, for the value of the answer. Raises `Disconnected`,
+        `DeviceBusy`, `Refusal`.
+        """
         return await asyncio.wrap_future(self._put(request, within_s))
 
     def _put(self, request: Request[T], within_s: float | None) -> "Future[T]":
@@ -94,7 +96,7 @@ class DeviceLine:
         self._exchange.stop()
 
     def ended(self, within_s: float) -> bool:
-        """Wait for the thread after `close`; True if it has ended."""
+        """Wait for the thread after `close`, at most `within_s`; return True if it has ended."""
         if self._thread is not None:
             self._thread.join(within_s)
         return self._thread is None or not self._thread.is_alive()

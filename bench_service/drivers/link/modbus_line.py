@@ -14,7 +14,8 @@ T = TypeVar("T")
 
 
 class ModbusLine:
-    """Reads may be asked twice, over a new connection; a write is never sent twice.
+    """Line to a Modbus device, in one thread: reads may be asked twice, over a new connection; a write is never sent
+    twice.
 
     After a lost answer the connection is given up, for the frames of a serial line do not say which request they
     answer.
@@ -37,15 +38,17 @@ class ModbusLine:
         self._thread = ThreadPoolExecutor(1, f"line {self._named}")
 
     async def read(self, register: Register) -> float:
-        """Read one value. Raises `Disconnected`, `DeviceFault` where the device refuses."""
+        """Read the registers of one value and return it. Raises `Disconnected`, `DeviceFault` where the device
+        refuses.
+        """
         return register.decode(await self._words(register.table, register.address, register.words))
 
     async def read_bit(self, bit: Bit) -> bool:
-        """Read one bit; raises as `read` does."""
+        """Read one bit of a register and return it; raises as `read` does."""
         return bit.of((await self._words(bit.table, bit.address, 1))[0])
 
     async def write(self, register: Register, value: float) -> None:
-        """Write one value, once. Raises `Disconnected`, `DeviceFault`."""
+        """Write one value into its registers, once. Raises `Disconnected`, `DeviceFault`."""
         await self._write(register.address, register.encode(value), f"{value:g} into register {register.address}")
 
     async def write_bit(self, bit: Bit, on: bool) -> None:

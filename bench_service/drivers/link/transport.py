@@ -11,18 +11,18 @@ CHUNK = 65536
 
 
 class LineCut(Exception):
-    """The other end closed the line, or the line broke."""
+    """Raised where the other end closed the line, or the line broke."""
 
 
 class Transport(Protocol):
-    """Open line of bytes."""
+    """An open line of bytes: TCP, UDP or serial. Blocking. Interface."""
 
     def send(self, data: bytes) -> None:
         """Send all bytes. Raises `LineCut`: some of them may have arrived."""
         ...
 
     def receive(self, timeout_s: float) -> bytes:
-        """Return what has arrived, at the latest after a time; empty: nothing. Raises `LineCut`."""
+        """Return the bytes that have arrived, waiting at most `timeout_s`; empty: none came. Raises `LineCut`."""
         ...
 
     def cut(self) -> None:
@@ -39,14 +39,16 @@ class SocketTransport:
         self._socket, self._stream = line, stream
 
     def send(self, data: bytes) -> None:
-        """Send all bytes, see `Transport`."""
+        """Send all bytes over the socket. Raises `LineCut`. Implements `Transport.send`."""
         try:
             self._socket.sendall(data)
         except OSError as error:
             raise LineCut(reason(error)) from error
 
     def receive(self, timeout_s: float) -> bytes:
-        """Return what has arrived, see `Transport`."""
+        """Return the bytes that have arrived, waiting at most `timeout_s`. Raises `LineCut`. Implements
+        `Transport.receive`.
+        """
         try:
             ready, _, _ = select.select([self._socket], [], [], max(0.0, timeout_s))
             if not ready:
@@ -59,7 +61,7 @@ class SocketTransport:
         return data
 
     def cut(self) -> None:
-        """Break the line, see `Transport`."""
+        """Shut the socket down from another thread. Implements `Transport.cut`."""
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
@@ -74,7 +76,7 @@ class SerialTransport:
         self._port = port
 
     def send(self, data: bytes) -> None:
-        """Send all bytes, see `Transport`."""
+        """Send all bytes over the port. Raises `LineCut`. Implements `Transport.send`."""
         try:
             self._port.write(data)
             self._port.flush()
@@ -82,7 +84,9 @@ class SerialTransport:
             raise LineCut(reason(error)) from error
 
     def receive(self, timeout_s: float) -> bytes:
-        """Return what has arrived, see `Transport`."""
+        """Return the bytes that have arrived, waiting at most `timeout_s`. Raises `LineCut`. Implements
+        `Transport.receive`.
+        """
         try:
             self._port.timeout = max(0.0, timeout_s)
             first = cast(bytes, self._port.read(1))
@@ -91,7 +95,7 @@ class SerialTransport:
             raise LineCut(reason(error)) from error
 
     def cut(self) -> None:
-        """Break the line, see `Transport`."""
+        """Cancel a reading under way from another thread. Implements `Transport.cut`."""
         with suppress(OSError):
             self._port.cancel_read()
 
@@ -100,7 +104,7 @@ class SerialTransport:
 
 
 def open_transport(address: Address, timeout_s: float) -> Transport:
-    """Open the line at an address. Raises `LineCut` with the reason in words."""
+    """Open the line at an address and return it. Raises `LineCut` with the reason in words."""
     try:
         if address.scheme == "tcp":
             line = socket.create_connection((address.host, address.port), timeout=timeout_s)
@@ -143,7 +147,7 @@ def _serial_port(address: Address, timeout_s: float) -> Any:
 
 
 def reason(error: OSError) -> str:
-    """Say an error of the operating system in words, without numbers and class names."""
+    """Return an error of the operating system in words, without numbers and class names."""
     if isinstance(error, TimeoutError):
         return "no device answers there"
     return (error.strerror or str(error) or type(error).__name__).lower()

@@ -25,7 +25,7 @@ STATUS_BITS = {0: "interlock fault", 6: "service request"}
 
 @dataclass(frozen=True)
 class Dialect:
-    """Settings of one controller's dialect."""
+    """Settings of one ACUTROL controller's dialect: prefix of the answers, line endings, acknowledgement."""
 
     reply_prefix_bytes: int = 8
     """Bytes before the text of each answer, of any value."""
@@ -57,72 +57,72 @@ class AbsoluteLimits:
 
 
 def line(dialect: Dialect, statement: str) -> bytes:
-    """Bytes of a statement. Raises `ValueError` for what cannot be one."""
+    """Return the bytes of a statement with its ending. Raises `ValueError` for what cannot be one."""
     if not statement.isascii() or not statement.isprintable():
         raise ValueError(f"statement {statement!r} has characters that are not printable ASCII")
     return statement.encode("ascii") + dialect.ending
 
 
 def number(value: float) -> str:
-    """Text of a number in a demand. Raises `ValueError` where it is not finite."""
+    """Return the text of a number in a demand. Raises `ValueError` where it is not finite."""
     if not isfinite(value):
         raise ValueError(f"{value!r} is not a number that can be commanded")
     return f"{value:.{DECIMALS}f}"
 
 
 def position_demand(axis: int, angle_deg: float) -> str:
-    """Statement that loads a position; it acts once the axis is in position mode."""
+    """Return the statement that loads a position; it acts once the axis is in position mode."""
     return f":demand:position {axis},{number(angle_deg)}"
 
 
 def rate_demand(axis: int, rate_deg_s: float) -> str:
-    """Statement that loads a rate."""
+    """Return the statement that loads a rate [deg/s]; it acts once the axis is in rate mode."""
     return f":demand:rate {axis},{number(rate_deg_s)}"
 
 
 def oscillator_demand(axis: int, amplitude_deg: float, frequency_hz: float, phase_deg: float) -> str:
-    """Statement that loads a sinusoid; it acts once the axis is in the synthesizer's mode."""
+    """Return the statement that loads a sinusoid; it acts once the axis is in the synthesizer's mode."""
     return f":demand:oscillator {axis},{number(amplitude_deg)},{number(frequency_hz)},{number(phase_deg)}"
 
 
 def demand_query(kind: Literal["position", "rate"], axis: int) -> str:
-    """Query of a loaded demand: by the grammar of queries, not seen in a driver."""
+    """Return the query of a loaded demand: by the grammar of queries, not seen in a driver."""
     return f":demand:{kind}? {axis}"
 
 
 def mode_statement(axis: int, mode: Mode) -> str:
-    """Statement that sets the mode of an axis."""
+    """Return the statement that sets the mode of an axis."""
     return f":mode:{MODE_STATEMENTS.get(mode, mode)} {axis}"
 
 
 def mode_query(axis: int) -> str:
-    """Query of an axis' mode."""
+    """Return the query of an axis' mode."""
     return f":mode? {axis}"
 
 
 def limit_statement(quantity: Quantity, mode: Mode, axis: int, value: float) -> str:
-    """Statement that sets a limit of one mode of an axis."""
+    """Return the statement that sets a limit (rate or acceleration) of one mode of an axis."""
     return f":limit:{quantity} {MODES[mode]},{axis},{number(value)}"
 
 
 def limit_query(quantity: Quantity, mode: Mode, axis: int) -> str:
-    """Query of such a limit."""
+    """Return the query of a limit of one mode of an axis."""
     return f":limit:{quantity}? {MODES[mode]},{axis}"
 
 
 def absolute_limits_query(axis: int) -> str:
-    """Query of an axis' factory limits."""
+    """Return the query of an axis' factory limits."""
     return f":limit:absolute? {axis}"
 
 
 def states_query(axes: Sequence[int]) -> str:
-    """One query of position and rate of several axes; one answer joins them by semicolons."""
+    """Return one query of position and rate of several axes; its answer joins them by semicolons."""
     parts = [f"pos? {axis}" for axis in axes] + [f"rate? {axis}" for axis in axes]
     return ":read:" + ";".join(parts)
 
 
 def interlock_query(axis: int) -> str:
-    """Query of an axis' interlock. There is no statement here that closes or resets one: a person does."""
+    """Return the query of an axis' interlock. There is no statement here that closes or resets one: a person does."""
     return f":interlock? {axis}"
 
 
@@ -131,7 +131,7 @@ STATUS_QUERY = "*stb?"
 
 
 def text(dialect: Dialect, answer: bytes) -> str:
-    """Text of an answer after its prefix. Raises `BadAnswer`."""
+    """Return the text of an answer after its prefix. Raises `BadAnswer` where it is shorter or not printable ASCII."""
     rest = answer[dialect.reply_prefix_bytes :]
     if len(answer) < dialect.reply_prefix_bytes:
         raise BadAnswer(f"{shown(answer)} is shorter than reply_prefix_bytes = {dialect.reply_prefix_bytes}")
@@ -160,7 +160,9 @@ def acknowledged(dialect: Dialect, answer: bytes) -> None:
 
 
 def identity(dialect: Dialect, answer: bytes) -> tuple[str, str, str, str]:
-    """Maker, model, serial and firmware. Raises `BadAnswer`, as where the prefix has another length."""
+    """Return maker, model, serial and firmware from an answer. Raises `BadAnswer`, as where the prefix has another
+    length.
+    """
     parts = [part.strip() for part in text(dialect, answer).split(",")]
     if len(parts) != 4 or not parts[0]:
         raise BadAnswer(
@@ -171,7 +173,7 @@ def identity(dialect: Dialect, answer: bytes) -> tuple[str, str, str, str]:
 
 
 def numbers(dialect: Dialect, answer: bytes, count: int, separator: str = ";") -> tuple[float, ...]:
-    """Numbers of an answer. Raises `BadAnswer` where they are not that many, or not finite."""
+    """Return the numbers of an answer. Raises `BadAnswer` where they are not `count`, or not finite."""
     found = text(dialect, answer)
     parts = found.split(separator)
     if len(parts) != count:
@@ -182,18 +184,18 @@ def numbers(dialect: Dialect, answer: bytes, count: int, separator: str = ";") -
 
 
 def states(dialect: Dialect, answer: bytes, axes: int) -> tuple[AxisState, ...]:
-    """States of the axes in the order of `states_query`. Raises `BadAnswer`."""
+    """Return the states of the axes in the order of `states_query`. Raises `BadAnswer`."""
     values = numbers(dialect, answer, 2 * axes)
     return tuple(AxisState(values[k], values[axes + k]) for k in range(axes))
 
 
 def absolute_limits(dialect: Dialect, answer: bytes) -> AbsoluteLimits:
-    """Factory limits of an axis. Raises `BadAnswer`."""
+    """Return the factory limits of an axis from the answer to `absolute_limits_query`. Raises `BadAnswer`."""
     return AbsoluteLimits(*numbers(dialect, answer, 6, ","))
 
 
 def word(dialect: Dialect, answer: bytes) -> str:
-    """One word in lower case, as a mode or an interlock. Raises `BadAnswer`."""
+    """Return one word of an answer in lower case, as a mode or an interlock. Raises `BadAnswer`."""
     found = text(dialect, answer)
     if not found.replace(" ", "").isalpha():
         raise BadAnswer(f"{found!r} is not a word")
@@ -201,7 +203,7 @@ def word(dialect: Dialect, answer: bytes) -> str:
 
 
 def status_byte(dialect: Dialect, answer: bytes) -> int:
-    """Status byte, 0 … 255. Raises `BadAnswer`."""
+    """Return the status byte of an answer, 0 … 255. Raises `BadAnswer`."""
     found = text(dialect, answer)
     if not (found.isascii() and found.isdigit() and len(found) <= 3 and int(found) <= 255):
         raise BadAnswer(f"{found!r} is not a status byte")

@@ -46,7 +46,7 @@ class Layout:
 
 @dataclass(frozen=True)
 class State:
-    """State of all channels at one moment."""
+    """Set points, actual values and switches of all channels of a chamber at one moment."""
 
     set_points: tuple[float, ...]
     actual: tuple[float, ...]
@@ -54,24 +54,24 @@ class State:
     """Switches as they came, which may be more than the layout has."""
 
     def bit(self, place: int | None) -> bool:
-        """True if a switch is on; one that the layout does not have is off."""
+        """Return whether the switch at a place is on; one that the layout does not have is off."""
         return place is not None and self.digital[place] == "1"
 
 
 def read_request(layout: Layout) -> bytes:
-    """Bytes that ask for the state."""
+    """Return the bytes that ask for the chamber's state."""
     return f"${layout.address:02d}I".encode("ascii") + ENDING
 
 
 def field(value: float) -> str:
-    """Field of an analogue value, six characters. Raises `ValueError` where it does not fit."""
+    """Return an analogue value as a field of six characters. Raises `ValueError` where it does not fit."""
     if not isfinite(value) or not LOWEST <= round(value, 1) <= HIGHEST:
         raise ValueError(f"{value!r} does not fit into a field, which holds {LOWEST} … {HIGHEST}")
     return f"{value + 0.0:06.1f}"
 
 
 def write_request(layout: Layout, set_points: Sequence[float], digital: str) -> bytes:
-    """Bytes that set all set points and switches at once. Raises `ValueError`."""
+    """Return the bytes that set all set points and switches at once. Raises `ValueError`."""
     if len(set_points) != layout.analogue:
         raise ValueError(f"{len(set_points)} set points, the machine has {layout.analogue}")
     if len(digital) < layout.digital or set(digital) - {"0", "1"}:
@@ -81,18 +81,20 @@ def write_request(layout: Layout, set_points: Sequence[float], digital: str) -> 
 
 
 def gradient_request(layout: Layout, up_k_min: float, down_k_min: float) -> bytes:
-    """Bytes that set the ramps up and down [K/min], those of humidity zero; seen in an emulator only."""
+    """Return the bytes that set the ramps up and down [K/min], those of humidity zero; seen in an emulator only."""
     fields = " ".join(field(value) for value in (up_k_min, down_k_min, 0.0, 0.0))
     return f"${layout.address:02d}U {fields}".encode("ascii") + ENDING
 
 
 def with_bit(digital: str, place: int, on: bool) -> str:
-    """Switches with one of them changed."""
+    """Return the text of the switches with the one at a place set or cleared."""
     return digital[:place] + ("1" if on else "0") + digital[place + 1 :]
 
 
 def state(layout: Layout, answer: bytes) -> State:
-    """State from a read: of each channel first the set point, then the actual value. Raises `BadAnswer`."""
+    """Return the state from the answer to a read: of each channel first the set point, then the actual value. Raises
+    `BadAnswer`.
+    """
     if answer.startswith(BANNER):
         raise BadAnswer(f"{shown(answer)} is the banner of another port of the controller")
     try:
@@ -112,7 +114,9 @@ def state(layout: Layout, answer: bytes) -> State:
 
 
 def acknowledged(answer: bytes) -> None:
-    """Check that an answer is none to a read: what follows a write is not established. Raises `BadAnswer`."""
+    """Check that an answer is short enough to be an acknowledgement, not an answer to a read; its text is not
+    specified. Raises `BadAnswer`.
+    """
     if len(answer) > 16 or len(answer.split()) > 1:
         raise BadAnswer(f"{shown(answer)} is not an acknowledgement of a write")
 

@@ -8,12 +8,12 @@ _REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
 def crc16_xmodem(data: bytes) -> int:
-    """CRC-16 of polynomial 0x1021 from 0, not reflected; of ``123456789`` it is 0x31C3."""
+    """Return the CRC-16 of polynomial 0x1021 from 0, not reflected; of ``123456789`` it is 0x31C3."""
     return binascii.crc_hqx(data, 0)
 
 
 def crc16_ccitt_false(data: bytes) -> int:
-    """CRC-16 of polynomial 0x1021 from 0xFFFF, not reflected; of ``123456789`` it is 0x29B1."""
+    """Return the CRC-16 of polynomial 0x1021 from 0xFFFF, not reflected; of ``123456789`` it is 0x29B1."""
     return binascii.crc_hqx(data, 0xFFFF)
 
 
@@ -27,17 +27,19 @@ def crc32_mpeg2(data: bytes) -> int:
 
 
 def crc32_ieee(data: bytes) -> int:
-    """CRC-32 of zlib; of ``123456789`` it is 0xCBF43926."""
+    """Return the CRC-32 of zlib; of ``123456789`` it is 0xCBF43926."""
     return zlib.crc32(data)
 
 
 def crc32_novatel(data: bytes) -> int:
-    """CRC-32 of zlib's polynomial from 0, not inverted, as NovAtel's messages have it."""
+    """Return the CRC-32 of zlib's polynomial from 0, not inverted, as NovAtel's messages have it."""
     return zlib.crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def sum16_words(data: bytes) -> int:
-    """Sum of the 16-bit words, least significant byte first, overflow left out; a last odd byte is a word."""
+    """Return the sum of the 16-bit words, least significant byte first, overflow left out; a last odd byte is a
+    word.
+    """
     return (sum(data[0::2]) + 256 * sum(data[1::2])) & 0xFFFF
 
 

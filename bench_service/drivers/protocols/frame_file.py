@@ -22,7 +22,7 @@ class _Part(BaseModel):
 
 
 class CounterPart(_Part):
-    """Counter of the frames."""
+    """Counter in each frame: its place and type, its step, and where it begins again."""
 
     offset: int = Field(ge=0)
     type: Literal["u8", "u16", "u32"]
@@ -34,14 +34,14 @@ class CounterPart(_Part):
 
     @property
     def modulus(self) -> int:
-        """Number after which it begins again."""
+        """Number of values of the counter, after which it begins again at 0."""
         if self.begins_again_at is not None:
             return self.begins_again_at
         return 1 << (8 * SIZES[self.type] if self.bits is None else self.bits)
 
 
 class ChannelPart(_Part):
-    """Channel of the frame."""
+    """Channel of the unit in each frame: its name and unit, its place, type, scale and offset."""
 
     name: Text
     quantity: Quantity
@@ -73,7 +73,7 @@ class StatusPart(_Part):
 
 
 class ChecksumPart(_Part):
-    """Checksum over a part of the frame."""
+    """Checksum in each frame: its kind, its place, and the bytes that it covers."""
 
     kind: Literal["crc16-xmodem", "crc16-ccitt-false", "crc32-mpeg2", "crc32-ieee", "crc32-novatel", "sum16-words"]
     offset: int = Field(ge=0)
@@ -83,7 +83,7 @@ class ChecksumPart(_Part):
 
 
 class FrameFormat(_Part):
-    """Format of a unit's frames, all of one length."""
+    """Format of a unit's frames, all of one length: sync, counter, channels, status, checksum."""
 
     name: Text
     sync: str = Field(pattern=r"^[0-9A-Fa-f]{2}( ?[0-9A-Fa-f]{2}){0,7}$")
@@ -102,7 +102,7 @@ class FrameFormat(_Part):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Channels as recordings have them."""
+        """Channels of the frame as recordings have them, in the order of the file."""
         return tuple(part.channel for part in self.channel)
 
     @model_validator(mode="after")
@@ -132,7 +132,9 @@ class FrameFormat(_Part):
 
 
 def read_frame_file(path: Path) -> FrameFormat:
-    """Read a frame's file. Raises `Misconfigured` with file, field and what is allowed."""
+    """Read and check a file that describes frames, and return their format. Raises `Misconfigured` with file, field and
+    what is allowed.
+    """
     try:
         return FrameFormat.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""Decoder of frames that a file describes."""
+"""Decoder of a stream of frames whose format a file describes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,9 @@ Bytes = NDArray[np.uint8]
 
 
 class FramedDecoder:
-    """Finds frames by sync and checksum. Bytes that belong to none are left out and counted."""
+    """Decodes frames by sync and checksum. Bytes that belong to none are left out and counted. Implements
+    `StreamDecoder`.
+    """
 
     def __init__(self, form: FrameFormat) -> None:
         self.form = form
@@ -25,7 +27,7 @@ class FramedDecoder:
 
     @property
     def modulus(self) -> int:
-        """Number after which the counter begins again."""
+        """Number of values of the counter, after which it begins again at 0."""
         return self.form.counter.modulus
 
     @property
@@ -39,7 +41,9 @@ class FramedDecoder:
         return len(self._buffer)
 
     def feed(self, data: bytes) -> Decoded:
-        """Decode what has come."""
+        """Decode the bytes that have come, with those that waited, and return the whole frames; a cut frame waits for
+        the next call.
+        """
         self._buffer += data
         frames, spoiled = self._whole_frames()
         block = np.frombuffer(b"".join(frames), dtype=np.uint8).reshape(len(frames), self.form.length)

@@ -82,7 +82,7 @@ RESPONSES = (
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame whose CRC was right."""
+    """One iXCOM frame whose CRC was right, in its parts."""
 
     message: int
     counter: int
@@ -94,7 +94,9 @@ class Frame:
 
 
 def frame_length(data: bytes) -> int | None:
-    """Length of the frame that begins some bytes; None: too few of them. Raises `BadAnswer` where none begins."""
+    """Return the length of the frame with which some bytes begin; None: too few of them. Raises `BadAnswer` where none
+    begins.
+    """
     if len(data) < 6:
         return None
     length = int.from_bytes(data[4:6], "little")
@@ -104,7 +106,7 @@ def frame_length(data: bytes) -> int | None:
 
 
 def frame(data: bytes) -> Frame:
-    """Decode one whole frame. Raises `BadAnswer`."""
+    """Return the parts of one whole frame. Raises `BadAnswer` for a wrong length or CRC."""
     length = frame_length(data)
     if length is None or len(data) != length:
         raise BadAnswer(f"{len(data)} bytes are not a whole frame")
@@ -116,7 +118,9 @@ def frame(data: bytes) -> Frame:
 
 
 def encode(message: int, counter: int, payload: bytes, status: int = 0) -> bytes:
-    """Bytes of a frame without a time stamp, as a host sends it."""
+    """Return the bytes of a frame without a time stamp, as a host sends it. Raises `ValueError` for a payload that is
+    too long.
+    """
     length = SHORTEST + len(payload)
     if length > LONGEST:
         raise ValueError(f"a payload of {len(payload)} bytes does not fit into a frame")
@@ -126,22 +130,24 @@ def encode(message: int, counter: int, payload: bytes, status: int = 0) -> bytes
 
 
 def open_channel(counter: int, channel: int) -> bytes:
-    """Bytes of the command that opens a channel."""
+    """Return the bytes of the command that opens a channel."""
     return encode(Message.COMMAND, counter, struct.pack("<HHHH", 5, 0, 1, channel))
 
 
 def log(counter: int, command: LogCommand, message: int, divider: int) -> bytes:
-    """Bytes of the command that changes which messages the channel sends."""
+    """Return the bytes of the command that changes which messages the channel sends, every `divider`-th of them."""
     return encode(Message.COMMAND, counter, struct.pack("<HHBBHH", 0, 0, message, 0, command, divider))
 
 
 def request_parameter(counter: int, parameter: int) -> bytes:
-    """Bytes that ask for a parameter; a response comes first, then the parameter."""
+    """Return the bytes that ask for a parameter; a response comes first, then the parameter."""
     return encode(Message.PARAMETER, counter, struct.pack("<HBB", parameter, 0, 1))
 
 
 def response(found: Frame) -> None:
-    """Check a response. Raises `Refusal` with its words, `BadAnswer` where the frame is none."""
+    """Check that a frame is a response that accepts. Raises `Refusal` with its words, `BadAnswer` where the frame is
+    none.
+    """
     if found.message != Message.RESPONSE or len(found.payload) < 2:
         raise BadAnswer(f"message 0x{found.message:02X} is not a response")
     code = int.from_bytes(found.payload[:2], "little")
@@ -151,7 +157,7 @@ def response(found: Frame) -> None:
 
 
 def parameter(found: Frame, number: int) -> bytes:
-    """Value of a parameter frame. Raises `BadAnswer` where it is another's."""
+    """Return the value of a parameter frame. Raises `BadAnswer` where it is another parameter's."""
     if found.message != Message.PARAMETER or len(found.payload) < 4:
         raise BadAnswer(f"message 0x{found.message:02X} is not a parameter")
     which = int.from_bytes(found.payload[:2], "little")
@@ -161,12 +167,14 @@ def parameter(found: Frame, number: int) -> bytes:
 
 
 def text_of(value: bytes) -> str:
-    """Text of a parameter up to its first zero byte."""
+    """Return the text of a parameter's value, up to its first zero byte."""
     return value.split(b"\0", 1)[0].decode("latin-1").strip()
 
 
 def inertial(payload: bytes) -> tuple[float, ...]:
-    """Specific force and angular rate of IMURAW, six numbers. Raises `BadAnswer`."""
+    """Return specific force and angular rate of an IMURAW payload, six numbers. Raises `BadAnswer` for another
+    length.
+    """
     if len(payload) != IMURAW.size:
         raise BadAnswer(f"a payload of {len(payload)} bytes is not an IMURAW message")
     return IMURAW.unpack(payload)

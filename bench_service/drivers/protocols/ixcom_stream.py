@@ -34,7 +34,7 @@ class IxcomDecoder:
         """Frames of other messages, the newest sixteen."""
 
     def begin_with(self, data: bytes) -> None:
-        """Take up bytes that came before the stream was listened to; the next `feed` decodes them."""
+        """Keep bytes that came before the stream was listened to; the next `feed` decodes them."""
         self._buffer += data
 
     @property
@@ -43,7 +43,9 @@ class IxcomDecoder:
         return len(self._buffer)
 
     def feed(self, data: bytes) -> Decoded:
-        """Decode what has come. Raises `BadAnswer` for a value that no count can hold."""
+        """Decode the bytes that have come, with those that waited, and return the whole frames. Raises `BadAnswer` for
+        a value that no count can hold.
+        """
         self._buffer += data
         frames, spoiled = self._whole_frames()
         raw = [f for f in frames if f.message == Message.IMURAW and len(f.payload) == ixcom.IMURAW.size]

@@ -13,7 +13,7 @@ WORDS = {"float32": 2, "int16": 1, "uint16": 1, "int32": 2}
 
 
 class Register(BaseModel):
-    """Value in one or two registers of 16 bits."""
+    """A value in one or two Modbus registers of 16 bits: address, table, type, orders, scale."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -29,11 +29,11 @@ class Register(BaseModel):
 
     @property
     def words(self) -> int:
-        """Number of registers."""
+        """Number of registers that the value takes."""
         return WORDS[self.type]
 
     def decode(self, registers: list[int]) -> float:
-        """Value of the registers. Raises `BadAnswer`."""
+        """Return the value in the registers. Raises `BadAnswer` where they are not as many as it has."""
         if len(registers) != self.words or any(not 0 <= word <= 0xFFFF for word in registers):
             raise BadAnswer(f"{registers!r} are not the {self.words} registers at {self.address}")
         words = registers if self.word_order == "big" else registers[::-1]
@@ -44,7 +44,7 @@ class Register(BaseModel):
         return float(value) * self.scale
 
     def encode(self, value: float) -> list[int]:
-        """Registers of a value. Raises `ValueError` where they cannot hold it."""
+        """Return the registers that hold a value. Raises `ValueError` where they cannot hold it."""
         if not isfinite(value):
             raise ValueError(f"{value!r} is not a number that a register can hold")
         counts: float = value / self.scale
@@ -61,7 +61,7 @@ class Register(BaseModel):
 
 
 class Bit(BaseModel):
-    """One bit of a register."""
+    """One bit of a Modbus register: address, place, table."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -70,16 +70,16 @@ class Bit(BaseModel):
     table: Literal["holding", "input"] = "holding"
 
     def of(self, word: int) -> bool:
-        """State of the bit in its register's word."""
+        """Return whether the bit is set in its register's word."""
         return bool(word >> self.bit & 1)
 
     def changed(self, word: int, on: bool) -> int:
-        """The register's word with this bit set or cleared, the others as they were."""
+        """Return the register's word with this bit set or cleared, the others as they were."""
         return word | 1 << self.bit if on else word & ~(1 << self.bit)
 
 
 class ChamberMap(BaseModel):
-    """Registers of a chamber."""
+    """Registers of a chamber: actual temperature, set point, running, and others that it may have."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -14,7 +14,7 @@ ERROR_QUERY = "SYST:ERR?"
 
 @dataclass(frozen=True)
 class Dialect:
-    """Settings of one supply's dialect."""
+    """Settings of one supply's SCPI dialect: channel, queries of trip and mode, line ending."""
 
     channel: int | None = None
     """Number of the output, as a suffix of the first header; None: a supply with one output and no suffix."""
@@ -26,14 +26,14 @@ class Dialect:
 
 
 def line(dialect: Dialect, statement: str) -> bytes:
-    """Bytes of a statement. Raises `ValueError` for what cannot be one."""
+    """Return the bytes of a statement with its ending. Raises `ValueError` for what cannot be one."""
     if not statement.isascii() or not statement.isprintable():
         raise ValueError(f"statement {statement!r} has characters that are not printable ASCII")
     return statement.encode("ascii") + dialect.ending
 
 
 def header(dialect: Dialect, words: str) -> str:
-    """Header with the channel's number after its first word, as in OUTP2:STAT."""
+    """Return the header with the channel's number after its first word, as in OUTP2:STAT."""
     if dialect.channel is None:
         return words
     first, colon, rest = words.partition(":")
@@ -42,29 +42,29 @@ def header(dialect: Dialect, words: str) -> str:
 
 
 def set_voltage(dialect: Dialect, voltage_v: float) -> str:
-    """Statement that sets the voltage."""
+    """Return the statement that sets the voltage [V]."""
     return f"{header(dialect, 'VOLT')} {number(voltage_v)}"
 
 
 def set_current(dialect: Dialect, current_a: float) -> str:
-    """Statement that sets the current limit."""
+    """Return the statement that sets the current limit [A]."""
     return f"{header(dialect, 'CURR')} {number(current_a)}"
 
 
 def set_output(dialect: Dialect, on: bool) -> str:
-    """Statement that switches the output."""
+    """Return the statement that switches the output on or off."""
     return f"{header(dialect, 'OUTP')} {'ON' if on else 'OFF'}"
 
 
 def number(value: float) -> str:
-    """Text of a number in a statement, four decimals. Raises `ValueError` where it is not finite."""
+    """Return the text of a number in a statement, four decimals. Raises `ValueError` where it is not finite."""
     if not isfinite(value):
         raise ValueError(f"{value!r} is not a number that can be commanded")
     return f"{value:.4f}"
 
 
 def text(answer: bytes) -> str:
-    """Text of an answer. Raises `BadAnswer`."""
+    """Return the text of an answer. Raises `BadAnswer` where it is empty or not printable ASCII."""
     try:
         found = answer.decode("ascii").strip()
     except UnicodeDecodeError:
@@ -75,7 +75,7 @@ def text(answer: bytes) -> str:
 
 
 def identity(answer: bytes) -> tuple[str, str, str, str]:
-    """Maker, model, serial and firmware. Raises `BadAnswer`."""
+    """Return maker, model, serial and firmware from an answer. Raises `BadAnswer`."""
     parts = [part.strip() for part in text(answer).split(",")]
     if len(parts) != 4:
         raise BadAnswer(f"{shown(answer)} is not an identity of four fields")
@@ -83,7 +83,7 @@ def identity(answer: bytes) -> tuple[str, str, str, str]:
 
 
 def value(answer: bytes) -> float:
-    """One number. Raises `BadAnswer`."""
+    """Return the number of an answer. Raises `BadAnswer` where it is none, or SCPI's "not a number"."""
     found = text(answer)
     try:
         number_found = float(found)
@@ -95,7 +95,7 @@ def value(answer: bytes) -> float:
 
 
 def switch(answer: bytes) -> bool:
-    """State of a switch. Raises `BadAnswer`."""
+    """Return whether an answer says that a switch is on. Raises `BadAnswer` for neither on nor off."""
     found = text(answer).upper()
     if found not in ("0", "1", "ON", "OFF"):
         raise BadAnswer(f"{found!r} is not the state of a switch")
@@ -103,7 +103,7 @@ def switch(answer: bytes) -> bool:
 
 
 def mode(answer: bytes) -> str:
-    """Mode of the output: "CV", "CC" or "OFF". Raises `BadAnswer`."""
+    """Return the mode of the output from an answer: "CV", "CC" or "OFF". Raises `BadAnswer`."""
     found = text(answer).upper()
     if found not in ("CV", "CC", "OFF"):
         raise BadAnswer(f"{found!r} is not the mode of an output")
@@ -111,7 +111,7 @@ def mode(answer: bytes) -> str:
 
 
 def error(answer: bytes) -> tuple[int, str]:
-    """Oldest error of the queue, 0 where it is empty. Raises `BadAnswer`."""
+    """Return number and text of the oldest error of the queue, 0 where it is empty. Raises `BadAnswer`."""
     found = text(answer)
     code, comma, words = found.partition(",")
     if not comma or not ERROR_CODE.fullmatch(code.strip()):

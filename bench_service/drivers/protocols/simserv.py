@@ -62,7 +62,7 @@ class ChamberStatus(IntFlag):
 
 
 def request(command: int, arguments: Sequence[str] = ()) -> bytes:
-    """Bytes of a request to the chamber. Raises `ValueError` for arguments that no request can carry."""
+    """Return the bytes of a request to the chamber. Raises `ValueError` for arguments that no request can carry."""
     if len(arguments) > MOST_ARGUMENTS or not 0 <= command <= 99999:
         raise ValueError(f"command {command} with {len(arguments)} arguments is none of SIMSERV")
     fields = [f"{command:05d}", str(CHAMBER), *arguments]
@@ -72,14 +72,16 @@ def request(command: int, arguments: Sequence[str] = ()) -> bytes:
 
 
 def number(value: float) -> str:
-    """Text of a number in a request, at most three decimals. Raises `ValueError` where it is not finite."""
+    """Return the text of a number in a request, at most three decimals. Raises `ValueError` where it is not finite."""
     if not isfinite(value):
         raise ValueError(f"{value!r} is not a number that can be sent")
     return f"{value:.3f}".rstrip("0").removesuffix(".")
 
 
 def reply(answer: bytes, values: int) -> tuple[str, ...]:
-    """Values of a reply after its code. Raises `Refusal` with the code in words, `BadAnswer`."""
+    """Return the values of a reply after its code. Raises `Refusal` with the code in words, `BadAnswer` where they are
+    not that many.
+    """
     if answer.startswith(BANNER):
         raise BadAnswer(f"{shown(answer)} is the banner of another port of the controller: SIMSERV is on port 2049")
     code, *rest = answer.split(SEPARATOR)
@@ -93,7 +95,7 @@ def reply(answer: bytes, values: int) -> tuple[str, ...]:
 
 
 def number_of(answer: bytes) -> float:
-    """One number of a reply. Raises `Refusal` also where the controller could not read it, `BadAnswer`."""
+    """Return the one number of a reply. Raises `Refusal` also where the controller could not read it, `BadAnswer`."""
     (text,) = reply(answer, 1)
     if text.casefold() == "read failed":
         raise Refusal("the controller could not read the value")
@@ -107,7 +109,7 @@ def number_of(answer: bytes) -> float:
 
 
 def whole_of(answer: bytes, least: int = 0, most: int = 65535) -> int:
-    """One whole number of a reply within a range. Raises `Refusal`, `BadAnswer`."""
+    """Return the one whole number of a reply, within a range. Raises `Refusal`, `BadAnswer`."""
     value = number_of(answer)
     if value != int(value) or not least <= value <= most:
         raise BadAnswer(f"{value:g} is not a whole number within {least} … {most}")
@@ -115,7 +117,7 @@ def whole_of(answer: bytes, least: int = 0, most: int = 65535) -> int:
 
 
 def text_of(answer: bytes) -> str:
-    """One text of a reply. Raises `Refusal`, `BadAnswer`."""
+    """Return the one text of a reply. Raises `Refusal`, `BadAnswer` where it is not printable."""
     (text,) = reply(answer, 1)
     if not text.isprintable():
         raise BadAnswer(f"{shown(answer)} holds characters that are not printable")
@@ -123,12 +125,14 @@ def text_of(answer: bytes) -> str:
 
 
 def accepted(answer: bytes) -> None:
-    """Check the reply to a set. Raises `Refusal`, `BadAnswer`."""
+    """Check that the chamber accepted a set command. Raises `Refusal` with its error code, `BadAnswer` for a malformed
+    reply.
+    """
     reply(answer, 0)
 
 
 def status_of(answer: bytes) -> ChamberStatus:
-    """Status of the chamber. Raises `Refusal`, `BadAnswer`."""
+    """Return the status of the chamber from a reply. Raises `Refusal`, `BadAnswer`."""
     value = whole_of(answer, 0, 15)
     if not value & ChamberStatus.PRESENT:
         raise BadAnswer(f"status {value} lacks the bit that is always set")

@@ -11,7 +11,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Decoded:
-    """Frames of some bytes, in the order in which they came."""
+    """Frames of some bytes, in the order in which they came: samples, counters, status words, and bytes left out."""
 
     counts: NDArray[np.int32]
     """Raw counts, (n, channels)."""
@@ -24,11 +24,11 @@ class Decoded:
 
 
 class StreamDecoder(Protocol):
-    """Decoder of a stream of frames; keeps what is not whole yet, which is never more than a few frames."""
+    """Decoder of a stream of frames; keeps what is not whole yet, which is never more than a few frames. Interface."""
 
     @property
     def modulus(self) -> int:
-        """Number after which the counter begins again."""
+        """Number of values of the counter, after which it begins again at 0."""
         ...
 
     @property
@@ -37,7 +37,7 @@ class StreamDecoder(Protocol):
         ...
 
     def feed(self, data: bytes) -> Decoded:
-        """Decode what has come."""
+        """Decode the bytes that have come, with those that waited, and return the whole frames."""
         ...
 
     def invalid(self, status: Integers) -> NDArray[np.bool_]:
@@ -51,7 +51,7 @@ class StreamDecoder(Protocol):
 
 @dataclass(frozen=True)
 class Gap:
-    """Place at which frames are missing."""
+    """Place in a stream at which frames are missing, by their counter."""
 
     at: int
     """Index of the first frame after the gap."""
@@ -77,7 +77,9 @@ class Continuity:
         self.last: int | None = None
 
     def check(self, counters: Integers) -> Gap | None:
-        """First gap within these counters or before them; None: nothing is missing."""
+        """Return the first gap within these counters, or between them and those of the last call; None: nothing is
+        missing.
+        """
         if len(counters) == 0:
             return None
         before = int(counters[0]) - self._step if self.last is None else self.last

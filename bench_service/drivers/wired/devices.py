@@ -5,7 +5,7 @@ that is safe by it gets no command. Simulated devices of a mixed bench live in t
 only the register.
 """
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from typing import Any
 
@@ -25,7 +25,9 @@ from procedures.bench.errors import BenchError, DeviceBusy, DeviceFault
 
 
 def unsafe_devices(state: DeviceState | None) -> frozenset[str]:
-    """Devices that the register has as unsafe; all where it knows nothing, or only that something failed."""
+    """Return the names of the devices that the register has as unsafe; all where it knows nothing, or only that
+    something failed.
+    """
     if state is None:
         return frozenset(SAFE_ORDER)
     conditions = {
@@ -39,14 +41,16 @@ def unsafe_devices(state: DeviceState | None) -> frozenset[str]:
 
 
 def safe_state(kind: str, section: DeviceSection | None, state: DeviceState) -> dict[str, Any]:
-    """Changes of the register once a device was made safe, by the policy of its section."""
+    """Return the fields of the register that change once a device was made safe, by the policy of its section."""
     if isinstance(section, ChamberSection) and section.on_safe != "ambient":
         return {"chamber_target_c": None}
     return SAFE_STATE[kind](state)
 
 
 class WiredDevices:
-    """The devices of a bench file on this host."""
+    """The real devices of a bench file on this host, without a job. Implements
+    `bench_service.bench.devices.BenchDevices`.
+    """
 
     def __init__(self, read: Callable[[], BenchFile], register: DeviceRegister) -> None:
         """Set up; `read`: returns the bench file, or raises `Misconfigured`, when devices are first reached."""
@@ -69,7 +73,9 @@ class WiredDevices:
         return self._register.read()
 
     def compare(self, by: str) -> tuple[str, ...]:
-        """Compare the real devices with the register, which then takes over what they say; see the port."""
+        """Connect to the real devices and return sentences about what differs from the register, which then takes over
+        what they say.
+        """
         state, file = self._register.read(), self._file
         kinds: list[Kind] = [kind for kind in SAFE if kind in file.real()]
         if state is None or not kinds:
@@ -114,9 +120,9 @@ class WiredDevices:
             if device in unsafe and device not in real:
                 link.note(f"{device}.make_safe", {}, **SAFE_STATE[device](link.state))
         kinds: list[Kind] = [kind for kind in SAFE if kind in unsafe and kind in real]
-        devices = opened(file, kinds, context_of(file))
+        context = context_of(file)
         work: dict[Kind, Callable[[], Coroutine[Any, Any, None]]] = {
-            kind: partial(_led_to_safety, device) for kind, device in devices.items()
+            kind: partial(_led_to_safety, partial(opened, file, (kind,), context), kind) for kind in kinds
         }
         failures: dict[Kind, Exception] = {}
 
@@ -127,11 +133,13 @@ class WiredDevices:
                 failures[kind] = outcome
                 link.note(f"{kind}.make_safe.failed", {"error": f"{type(outcome).__name__}: {outcome}"})
 
-        in_parallel(work, {kind: _deadline_s(real[kind]) for kind in devices}, done)
+        in_parallel(work, {kind: _deadline_s(real[kind]) for kind in kinds}, done)
         return [_of_device(kind, failures[kind]) for kind in kinds if kind in failures]
 
 
-async def _led_to_safety(device: Any) -> None:
+async def _led_to_safety(make: Callable[[], Mapping[Kind, Any]], kind: Kind) -> None:
+    """Make a device by its driver and lead it to safety, in its own thread: what fails here is its own failure."""
+    device = make()[kind]
     try:
         await device.connect()
         await device.make_safe()

@@ -20,11 +20,12 @@ from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.drivers.wall_bench_clock import WallBenchClock
 from bench_service.drivers.wired.devices import WiredDevices, safe_state
 from bench_service.drivers.wired.entered_environment import EnteredEnvironment
-from bench_service.drivers.wired.guarded import LaunchedUnit, LaunchingSupply
+from bench_service.drivers.wired.guarded import LaunchedUnit, LaunchingSupply, ready_of
 from bench_service.drivers.wired.mixed import CatchUp, MixedClock, TwinSupply, TwinTurntable
 from bench_service.drivers.wired.mixed_air import AiredClock, AiredUnit, RealAir
 from bench_service.drivers.wired.opening import opened, survey
 from bench_service.drivers.wired.parallel import named
+from bench_service.drivers.wired.served_person import ServedPerson
 from bench_service.model.errors import NotMounted
 from procedures.bench import Bench, BenchDescription, BenchNeeds, Clock, Environment, Operator
 from procedures.bench.errors import DeviceFault, Disconnected
@@ -36,7 +37,7 @@ REAL_UNIT: tuple[Kind, ...] = ("turntable", "supply", "unit_link")
 
 
 class WiredBench(RegisteredBench):
-    """A bench with real devices; closing it drops their links."""
+    """A bench with real devices during a job; closing it drops their links."""
 
     def __init__(
         self,
@@ -50,14 +51,16 @@ class WiredBench(RegisteredBench):
         self._devices = devices
 
     def close(self) -> None:
-        """Drop the devices' links, then give the register's back."""
+        """Drop the devices' links, then release the register's link."""
         for device in self._devices.values():
             device.close()
         super().close()
 
 
 class BenchFileDriver:
-    """Implements `bench_service.bench.driver.BenchDriver` by a bench file."""
+    """Driver of a bench that a bench file describes, real and simulated devices mixed. Implements
+    `bench_service.bench.driver.BenchDriver`.
+    """
 
     def __init__(
         self, file: BenchFile, simulated: SimulatedDriver, register: DeviceRegister, asking: Asking | None
@@ -72,6 +75,7 @@ class BenchFileDriver:
         self._asking = asking
         self._units = read_units(file.folder / "units")
         self._found: dict[Kind, Found] = {}
+        self._told: set[str] = set()
         self._devices = WiredDevices(lambda: file, register)
         self._description = described(file, simulated.description)
         for kind, failure in self._look().items():
@@ -82,7 +86,7 @@ class BenchFileDriver:
         return self._description
 
     def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
-        """The units that have a file; those of the simulation where the unit is simulated."""
+        """Return the units that have a file; those of the simulation where the unit is simulated."""
         return self._simulated.mounted(serial) if self._file.within("unit_link") else self._units
 
     def open(
@@ -114,6 +118,11 @@ class BenchFileDriver:
             link.close()
             raise
 
+    def warm_up(self) -> None:
+        """Load what a simulated unit needs, where the bench file has one."""
+        if self._file.within("unit_link"):
+            self._simulated.warm_up()
+
     def _need_devices(self, needs: BenchNeeds) -> None:
         before = dict(self._found)
         failures = self._look()
@@ -135,14 +144,18 @@ class BenchFileDriver:
         found = survey(self._file)
         self._found |= found.found
         for sentence in found.limits_said(self._file):
-            log.warning("bench %s: %s", self._file.id, sentence)
+            if sentence not in self._told:  # it is asked before each job, and differs but rarely
+                log.warning("bench %s: %s", self._file.id, sentence)
+            self._told.add(sentence)
         self._description = described(self._file, self._simulated.description, self._found)
         return found.failures
 
     def _opened(self, unit: Unit, seed: int, needs: BenchNeeds, job: str | None, link: DeviceLink) -> Bench:
         wall, file, description = WallBenchClock(factor=self._file.time_factor), self._file, self._description
         context = DriverContext(
-            file.id, wall, file.folder, unit, lambda: link.state.powered, lambda e, more: self._note(job, e, more)
+            *(file.id, wall, file.folder, unit, lambda: link.state.powered),
+            note=lambda e, more: self._note(job, e, more),
+            time_factor=file.time_factor,
         )
         kinds: list[Kind] = [kind for kind in file.real() if _is_wanted(kind, needs)]
         devices = opened(file, kinds, context)
@@ -151,7 +164,7 @@ class BenchFileDriver:
         if any(file.within(kind) for kind in ("turntable", "unit_link", "supply", "chamber", "current_source")):
             self._add_simulated(bench, unit.serial, seed, needs, wall)
         if not file.within("unit_link"):
-            supply = LaunchingSupply(bench.supply, bench.clock.now_s)
+            supply = LaunchingSupply(bench.supply, bench.clock.now_s, ready_of(bench.imu))
             bench.supply, bench.imu = supply, LaunchedUnit(bench.imu, supply)  # pyright: ignore[reportAttributeAccessIssue]
         bench.operator = self._operator(bench.operator, job)
         bench.safe_s = {k: s.safe_s for k, s in file.real().items() if isinstance(s, Wire)}
@@ -184,10 +197,12 @@ class BenchFileDriver:
         bench.operator = seen.operator
 
     def _operator(self, simulated: Operator | None, job: str | None) -> Operator | None:
-        """A person who is asked where the file says so, else the simulated one."""
-        if self._file.rest.operator.driver == "asked":
-            return None if self._asking is None or job is None else self._asking(job, None)
-        return simulated
+        """A person who is asked where the file says so; else the simulated one, in this process or at its address."""
+        section = self._file.rest.operator
+        served = None if section.address is None else ServedPerson(section.address)
+        if section.driver == "asked":
+            return None if self._asking is None or job is None else self._asking(job, served)
+        return served or simulated
 
     def _environment(self, devices: Mapping[Kind, Any], clock: Clock) -> Environment | None:
         """A sensor of the room, or the values that were entered."""
@@ -208,15 +223,15 @@ class BenchFileDriver:
         return self._devices.device_state()
 
     def compare(self, by: str) -> tuple[str, ...]:
-        """Compare the devices with their register; see `WiredDevices`."""
+        """Compare the devices with their register and return the differences; see `WiredDevices.compare`."""
         return self._devices.compare(by)
 
     def make_safe(self, by: str) -> DeviceState:
-        """Make the devices safe without a job; see `WiredDevices`."""
+        """Make the devices safe without a job, and return their state; see `WiredDevices.make_safe`."""
         return self._devices.make_safe(by)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
-        """Nothing: of a bench with real devices no truth is known."""
+        """Return nothing: of a bench with real devices no true values are known."""
         return ()
 
 

@@ -7,17 +7,19 @@ from procedures.bench.environment import EnvironmentReading
 
 
 class EnteredEnvironment:
-    """Gives the entered values at any time."""
+    """Room conditions that a person entered in the bench file, the same at any time. Implements
+    `procedures.bench.environment.Environment`.
+    """
 
     def __init__(self, section: EnvironmentSection, clock: Clock) -> None:
         self._section = section
         self._clock = clock
 
     async def identify(self) -> DeviceIdentity:
-        """Nothing but that the values were entered."""
+        """Return an identity that only says that the values were entered."""
         return DeviceIdentity(model="entered in the bench file")
 
     async def read(self) -> EnvironmentReading:
-        """The entered values; see the port."""
+        """Return the entered temperature, humidity and pressure, at the present bench time."""
         s = self._section
         return EnvironmentReading(self._clock.now_s(), s.temperature_c, s.humidity_percent, s.pressure_hpa)

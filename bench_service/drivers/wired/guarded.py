@@ -1,6 +1,6 @@
 """Devices that are read back by the bench itself, whatever their driver does: safe only when they read as safe."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Any
 
@@ -59,11 +59,14 @@ class GuardedTurntable(Guarded):
 
 
 class LaunchingSupply:
-    """A supply that notes when the unit was switched on; every other verb is its own."""
+    """A supply that records when the unit was switched on, and waits for its valid data; every other verb is its
+    own.
+    """
 
-    def __init__(self, supply: Any, now_s: Callable[[], float]) -> None:
+    def __init__(self, supply: Any, now_s: Callable[[], float], ready: Callable[[], Awaitable[None]]) -> None:
+        """Set up; `ready`: waits until the unit says that its data are valid, within a bound; raises nothing."""
         self._supply = supply
-        self._now_s = now_s
+        self._now_s, self._ready = now_s, ready
         self.launched_s: float | None = None
         """Bench time at which the unit was switched on [s]; None while it is off, or where it was on before."""
 
@@ -75,6 +78,7 @@ class LaunchingSupply:
         await self._supply.switch_on()
         if not before.on:
             self.launched_s = self._now_s()
+            await self._ready()
 
     async def switch_off(self) -> None:
         self.launched_s = None
@@ -98,3 +102,12 @@ class LaunchedUnit:
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
         stream: Stream = self._unit.record(duration_s, station)
         return stream if stream.launched_s is not None else replace(stream, launched_s=self._supply.launched_s)
+
+
+def ready_of(unit: Any) -> Callable[[], Awaitable[None]]:
+    """The unit's link's wait for valid data; one that returns at once for a driver without it."""
+    return getattr(unit, "ready", _at_once)
+
+
+async def _at_once() -> None:
+    return

@@ -19,10 +19,10 @@ from procedures.core.turn import Turn
 
 
 class FollowingClock(Protocol):
-    """Clock of a simulated world that follows another one."""
+    """Clock of a simulated world that follows another one. Interface."""
 
     def catch_up(self) -> None:
-        """Move the world to the present moment."""
+        """Compute the world up to the present moment of the clock that it follows."""
         ...
 
     def now_s(self) -> float:
@@ -35,7 +35,7 @@ class FollowingClock(Protocol):
 
 
 class CatchUp:
-    """A `bench_service.bench.observed.Observer` that moves the world to the present before each verb."""
+    """Observer of a mixed bench that computes the simulated world up to the present before each verb."""
 
     def __init__(self, world: FollowingClock) -> None:
         self._world = world
@@ -69,7 +69,7 @@ class MixedClock:
 
 
 class TwinTurntable:
-    """A real table with a simulated one below it that carries the simulated unit."""
+    """A real table, whose motion a simulated one repeats, which carries the simulated unit."""
 
     def __init__(self, real: Any, below: Any) -> None:
         self._real, self._below = real, below
@@ -112,7 +112,7 @@ class TwinTurntable:
 
 
 class TwinSupply:
-    """A real supply; a simulated unit gets its power with it."""
+    """A real supply whose switching is repeated to a simulated unit."""
 
     def __init__(self, real: Any, below: Any) -> None:
         self._real, self._below = real, below

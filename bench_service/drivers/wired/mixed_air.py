@@ -23,7 +23,7 @@ AIR_S = 1.0
 
 
 class RealAir:
-    """Carries a real chamber's air to a simulated unit."""
+    """Gives the air temperature of a real chamber to the heat of a simulated unit."""
 
     def __init__(self, chamber: Chamber, clock: Clock, follow: Callable[[float], object]) -> None:
         """Set up; `follow`: has the simulated unit stand in air of a temperature [°C]."""
@@ -31,7 +31,9 @@ class RealAir:
         self._read_s = -inf
 
     async def look(self) -> None:
-        """Read the air where its last reading is old enough. Raises `Disconnected`."""
+        """Read the chamber's air, where the last reading is old enough, and pass it to the unit. Raises
+        `Disconnected`.
+        """
         now_s = self._clock.now_s()
         if now_s - self._read_s >= AIR_S:
             self._read_s = now_s

@@ -23,7 +23,9 @@ SAFE: tuple[Kind, ...] = ("turntable", "chamber", "current_source", "supply")
 
 
 def opened(file: BenchFile, kinds: Iterable[Kind], context: DriverContext) -> dict[Kind, Any]:
-    """Make the real devices of some kinds. Sends nothing. Raises `Misconfigured` for a driver that is gone."""
+    """Return the real devices of some kinds as objects, by kind. Sends nothing. Raises `Misconfigured` for a driver
+    that is gone.
+    """
     sections = file.real()
     return {kind: _opened(kind, sections[kind], context) for kind in kinds if kind in sections}
 
@@ -36,21 +38,23 @@ def _opened(kind: Kind, section: DeviceSection, context: DriverContext) -> Any:
 
 
 def context_of(file: BenchFile) -> DriverContext:
-    """Surroundings of devices that are asked outside a job: a unit that sends nothing is taken as switched off."""
+    """Return the surroundings of devices that are asked outside a job: a unit that sends nothing is taken as switched
+    off.
+    """
     clock = WallBenchClock(factor=file.time_factor)
     return DriverContext(file.id, clock, Path(file.folder), powered=lambda: False)
 
 
 @dataclass(frozen=True)
 class Survey:
-    """Findings of a survey, device by device."""
+    """Findings of a survey of the real devices: identity and limits, readings, and failures, each by device."""
 
     found: dict[Kind, Found] = field(default_factory=dict[Kind, Found])
     readings: dict[Kind, Any] = field(default_factory=dict[Kind, Any])
     failures: dict[Kind, Exception] = field(default_factory=dict[Kind, Exception])
 
     def limits_said(self, file: BenchFile) -> tuple[str, ...]:
-        """Sentences about limits that differ between file and devices."""
+        """Return sentences about limits that differ between file and devices."""
         return tuple(
             f"{kind}.{sentence}"
             for kind, found in self.found.items()
@@ -59,7 +63,7 @@ class Survey:
 
 
 def survey(file: BenchFile, kinds: Iterable[Kind] | None = None) -> Survey:
-    """Connect to the real devices at the same time; identities, limits and readings. Commands nothing.
+    """Connect to the real devices at the same time, wait, and return identities, limits and readings. Commands nothing.
 
     A device that does not answer is among the failures, with its address.
     """

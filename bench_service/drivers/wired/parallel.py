@@ -57,5 +57,5 @@ def in_parallel(
 
 
 def named(device: str) -> str:
-    """Name of a device for a person: "unit link"."""
+    """Return the name of a device for a person, such as "unit link"."""
     return device.replace("_", " ")

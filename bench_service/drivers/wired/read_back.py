@@ -20,7 +20,7 @@ CURRENT_MA = 1e-3
 
 
 def unsafe_reading(kind: Kind, section: DeviceSection, reading: Any) -> str:
-    """The reason why a device that was made safe reads back as unsafe; empty: it is safe."""
+    """Return the reason why a device that was made safe reads back as unsafe; empty: it is safe."""
     if isinstance(reading, TableReading) and reading.moving:
         return "the turntable still moves"
     if isinstance(reading, SupplyReading) and reading.on:
@@ -40,12 +40,12 @@ def _unsafe_chamber(section: ChamberSection, reading: ChamberReading) -> str:
         return f"the chamber still runs, to {target:g} °C"
     ambient = None if section.limits is None else section.limits.ambient_c
     if ambient is not None and abs(target - ambient) > SET_POINT_C:
-        return f"the chamber is still led to {target:g} °C, and not to {ambient:g}"
+        return f"the chamber is still commanded to {target:g} °C, and not to {ambient:g}"
     return ""
 
 
 def differences(state: DeviceState, readings: dict[Kind, Any], description: BenchDescription) -> tuple[str, ...]:
-    """Differences between the register and the devices themselves, a sentence each.
+    """Return the differences between the register and the devices themselves, a sentence each.
 
     Angles are compared to within the table's accuracy; whole turns count, except of an axis that turns endlessly.
     """
@@ -63,7 +63,7 @@ def differences(state: DeviceState, readings: dict[Kind, Any], description: Benc
 
 
 def as_read(readings: dict[Kind, Any]) -> dict[str, Any]:
-    """Fields of the register by what the devices say."""
+    """Return the fields of the register as the devices' readings give them."""
     changes: dict[str, Any] = {}
     for reading in readings.values():
         if isinstance(reading, TableReading):
@@ -85,13 +85,15 @@ def _on(on: bool) -> str:
 
 
 def _chamber(state: DeviceState, reading: ChamberReading) -> list[str]:
-    """A chamber that stands still is as safe as can be, whatever it was led to: a limiter may have stopped it."""
+    """Faults of the chamber's set point. A chamber that stands still has none, whatever was commanded: a limiter may
+    have stopped it.
+    """
     if reading.target_c is None or (
         state.chamber_target_c is not None and abs(reading.target_c - state.chamber_target_c) <= SET_POINT_C
     ):
         return []
-    left = "standing still" if state.chamber_target_c is None else f"led to {state.chamber_target_c:g} °C"
-    return [f"the chamber is led to {reading.target_c:g} °C, and was left {left}"]
+    left = "standing still" if state.chamber_target_c is None else f"commanded to {state.chamber_target_c:g} °C"
+    return [f"the chamber is commanded to {reading.target_c:g} °C, and was left {left}"]
 
 
 def _table(state: DeviceState, reading: TableReading, description: BenchDescription) -> list[str]:

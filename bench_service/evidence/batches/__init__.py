@@ -1,1 +1,3 @@
-"""Batches of analyses: submission, port of memory, and the runner that claims tasks; no bench is needed."""
+"""Batches of analyses: submission, the interface of their store, and the runner that claims tasks; no bench is
+needed.
+"""

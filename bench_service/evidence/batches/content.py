@@ -28,7 +28,9 @@ def content_of(
     calibrations: Sequence[StoredCalibration],
     unit: Unit | None,
 ) -> str:
-    """Compute the digest (SHA-256, hexadecimal). `parameters`: as JSON, with their defaults."""
+    """Return the digest (SHA-256, hexadecimal) of all that an analysis reads. `parameters`: as JSON, with their
+    defaults.
+    """
     read = [
         ["method", method, version],
         ["parameters", parameters],

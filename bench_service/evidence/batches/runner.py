@@ -42,11 +42,11 @@ log = logging.getLogger(__name__)
 
 
 class WorkerName(Protocol):
-    """A worker's name with its lease."""
+    """A worker's name, with the lease on it that this process holds. Interface."""
 
     @property
     def name(self) -> str:
-        """The name that is held."""
+        """The name that this process holds."""
         ...
 
     def held(self) -> bool:
@@ -59,10 +59,12 @@ class WorkerName(Protocol):
 
 
 class WorkerNames(Protocol):
-    """PORT: names of workers, each held by one process at most."""
+    """Names of workers, each held by one process at most. Interface; see `persistence/evidence/worker_names.py`."""
 
     def take(self) -> WorkerName:
-        """Take the first name that is free. Raises `Overloaded` where all are taken, `StorageFailure`."""
+        """Take the first name that no process holds, and return it. Raises `Overloaded` where all are taken,
+        `StorageFailure`.
+        """
         ...
 
     def alive(self, name: str) -> bool:
@@ -75,7 +77,7 @@ Compute = Callable[[AnalysisRequest], tuple[str, bool]]
 
 
 class BatchRunner:
-    """Claims and runs tasks in `at_once` threads, each of which waits for one computation."""
+    """Claims and runs tasks of batches in `at_once` threads, each of which waits for one computation."""
 
     def __init__(
         self,
@@ -110,7 +112,7 @@ class BatchRunner:
         """Time of the last task's end; None while there is nothing to rest from."""
 
     def begin(self) -> None:
-        """Begin to claim tasks; a second call does nothing."""
+        """Start the threads that claim tasks; a second call does nothing."""
         with self._mutex:
             if self._threads or self._ending.is_set():
                 return
@@ -121,12 +123,14 @@ class BatchRunner:
             thread.start()
 
     def wake(self) -> None:
-        """Look for tasks now; begins where it has not begun yet."""
+        """Have the threads look for tasks now; starts them where they have not been started."""
         self.begin()
         self._wake.set()
 
     def end(self, within_s: float = LEAVE_S) -> None:
-        """Claim no more tasks, and wait for those under way; what is not done in time goes back into the queue."""
+        """Claim no more tasks, and wait for those under way, within a limit; what is not done in time goes back into
+        the queue.
+        """
         self._ending.set()
         self._wake.set()
         deadline = monotonic_s() + within_s

@@ -20,7 +20,9 @@ MOST_WAITING = 100_000
 
 
 class BatchService:
-    """Batches of analyses, from submission to retry; `BatchRunner` and other processes run their tasks."""
+    """Operations of clients on batches of analyses, from submission to retry; `BatchRunner` and other processes run the
+    tasks.
+    """
 
     def __init__(self, stores: EvidenceStores, catalogue: Catalogue, wake: Callable[[], object] = lambda: None) -> None:
         """Set up with `wake`, called after a batch was queued."""
@@ -63,11 +65,13 @@ class BatchService:
         return added
 
     def cancel(self, batch_id: str, by: str) -> AnalysisBatch:
-        """Cancel the waiting tasks; those that run end by themselves. Raises `NotFound`, `IllegalTransition`."""
+        """Cancel the waiting tasks of a batch and return it; those that run end by themselves. Raises `NotFound`,
+        `IllegalTransition`.
+        """
         return self._stores.batches.cancel(batch_id, by, now())
 
     def retry(self, batch_id: str) -> AnalysisBatch:
-        """Queue failed and cancelled tasks again. Raises `NotFound`, `IllegalTransition`."""
+        """Queue failed and cancelled tasks of a batch again, and return it. Raises `NotFound`, `IllegalTransition`."""
         batch = self._stores.batches.retry(batch_id, now())
         self._wake()
         return batch
@@ -90,7 +94,9 @@ class BatchService:
 
 
 def grouped(found: Sequence[tuple[str, str | None, str]], each: Grouping) -> list[tuple[str, ...]]:
-    """Group recordings, given as (id, job, unit), in the order of their first ones; without a job each is alone."""
+    """Group the ids of recordings, given as (id, job, unit), in the order of their first ones; a recording without a
+    job is a group alone.
+    """
     groups: dict[str, list[str]] = {}
     for recording, job, unit in found:
         by = {Grouping.RECORDING: recording, Grouping.JOB: job or recording, Grouping.UNIT: unit}[each]

@@ -1,4 +1,4 @@
-"""PORT of memory for batches of analyses and their tasks. Every method is one transaction."""
+"""Interface of the store of batches of analyses and their tasks. Every method is one transaction."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -10,10 +10,10 @@ from bench_service.model.records import Idempotency, Page
 
 
 class BatchStore(Protocol):
-    """The stored batches, and the queue of their tasks."""
+    """Store of batches, and the queue of their tasks. Interface; the SQL is in `persistence`."""
 
     def select(self, selection: Selection, limit: int) -> tuple[tuple[str, str | None, str], ...]:
-        """(id, job, unit) of at most `limit` complete recordings of a selection, oldest first."""
+        """Return (id, job, unit) of at most `limit` complete recordings of a selection, oldest first."""
         ...
 
     def add(
@@ -34,15 +34,19 @@ class BatchStore(Protocol):
     def tasks(
         self, batch_id: str, *, state: TaskState | None = None, after: int | None = None, limit: int = 50
     ) -> tuple[AnalysisTask, ...]:
-        """Tasks in the order of their numbers, from after a number on. Raises `NotFound`."""
+        """Return at most `limit` tasks of a batch in the order of their numbers, those after the number `after`. Raises
+        `NotFound`.
+        """
         ...
 
     def waiting(self, most: int) -> int:
-        """Number of tasks of all batches that wait, counted up to `most`."""
+        """Return the number of waiting tasks of all batches, counted up to `most`."""
         ...
 
     def claim(self, worker: str, at: datetime) -> ClaimedTask | None:
-        """Claim the next due task for a worker; None where none is due. No task is ever claimed by two workers."""
+        """Claim the next due task for a worker and return it; None where none is due. No task is ever claimed by two
+        workers.
+        """
         ...
 
     def end(
@@ -54,7 +58,7 @@ class BatchStore(Protocol):
         result: str | None = None,
         failure: Failure | None = None,
     ) -> bool:
-        """Write the end of a claimed task; False where the claim was lost meanwhile, and nothing is changed."""
+        """Store the end of a claimed task; return False where the claim was lost meanwhile, and nothing is changed."""
         ...
 
     def put_back(
@@ -67,22 +71,23 @@ class BatchStore(Protocol):
         ...
 
     def claimants(self) -> tuple[str, ...]:
-        """Names of the workers that have running tasks."""
+        """Return the names of the workers that have running tasks."""
         ...
 
     def orphaned(self, worker: str, most_attempts: int, at: datetime) -> int:
-        """Put all running tasks of a dead worker back; one that was claimed `most_attempts` times fails.
-
-        Returns their number.
+        """Put all running tasks of a dead worker back, and return their number; one that was claimed `most_attempts`
+        times fails.
         """
         ...
 
     def cancel(self, batch_id: str, by: str, at: datetime) -> AnalysisBatch:
-        """Cancel every waiting task of a batch; running ones end by themselves. Raises `NotFound`,
+        """Cancel every waiting task of a batch and return it; running ones end by themselves. Raises `NotFound`,
         `IllegalTransition` for a batch that has ended.
         """
         ...
 
     def retry(self, batch_id: str, at: datetime) -> AnalysisBatch:
-        """Queue the failed and cancelled tasks of an ended batch again. Raises `NotFound`, `IllegalTransition`."""
+        """Queue the failed and cancelled tasks of an ended batch again, and return it. Raises `NotFound`,
+        `IllegalTransition`.
+        """
         ...

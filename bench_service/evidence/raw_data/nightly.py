@@ -22,7 +22,9 @@ log = logging.getLogger(__name__)
 
 
 class NightlyStorage:
-    """Runs the rules of the deployment; of several processes on one database the first one of the night does it."""
+    """Applies the deployment's rules of retention and archive once a night; of several processes on one database the
+    first one of the night does it.
+    """
 
     def __init__(self, raw_data: RawDataService, stores: EvidenceStores, by: str) -> None:
         """Set up with `by`, the name of this process in reports."""
@@ -31,7 +33,9 @@ class NightlyStorage:
         self._stores = stores
 
     def run(self, ending: Event) -> None:
-        """Remove and archive what the rules say, until done or `ending` is set; leaves reports and audit entries."""
+        """Remove and archive raw data as the rules say, until done or `ending` is set; blocks, and stores reports and
+        audit entries.
+        """
         rules, raw = self._raw_data.settings, self._raw_data
         if rules.remove_days is not None:
             self._one(UpkeepKind.RETENTION, "remove_raw_data", lambda go: raw.remove(None, False, go), ending)
@@ -57,7 +61,7 @@ class NightlyStorage:
 
 
 def document_of(plan: RawPlan) -> dict[str, object]:
-    """The outcome of a rule as JSON."""
+    """Return the outcome of a rule as a JSON object, for the report of the night."""
     return {
         "days": plan.rule.days,
         "before": plan.before.isoformat(),

@@ -38,7 +38,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class StorageSettings:
-    """The rules of a deployment; None: no such rule, no archive."""
+    """The deployment's rules for raw data: days until removal, days until archiving, the archive's address; None: no
+    such rule, no archive.
+    """
 
     remove_days: float | None = None
     archive_days: float | None = None
@@ -46,7 +48,7 @@ class StorageSettings:
 
 
 class RawDataService:
-    """The raw data of one database."""
+    """Operations on the raw data of one database: removal, archiving, restoration, holds, report of sizes."""
 
     def __init__(
         self,
@@ -106,15 +108,17 @@ class RawDataService:
         return self._stores.recordings.get(recording_id)
 
     def hold(self, recording_id: str, reason: str, by: str) -> Hold:
-        """Hold a recording's raw data: no rule removes them. Raises `NotFound`, `RawDataRemoved`."""
+        """Store a hold on a recording's raw data, so that no rule removes them, and return it. Raises `NotFound`,
+        `RawDataRemoved`.
+        """
         return self._stores.raw_data.add_hold(Hold(new_id(), recording_id, reason, by, now()))
 
     def release(self, hold_id: str, by: str) -> Hold:
-        """Release a hold. Raises `NotFound`, `IllegalTransition`."""
+        """Release a hold and return it. Raises `NotFound`, `IllegalTransition` for one that was released."""
         return self._stores.raw_data.release_hold(hold_id, by, now())
 
     def report(self) -> StorageReport:
-        """Read the size of the database and of what is in it, and predict it."""
+        """Return the size of the database and of its parts, its growth, and a prediction of when the disk is full."""
         size, at, rules = self._database.size(), now(), self.settings
         growth = self._stores.raw_data.growth(at - timedelta(days=GROWTH_DAYS), at)
         shares = self._stores.raw_data.shares()

@@ -1,4 +1,4 @@
-"""PORTS of memory for the raw data of recordings: the rows that say where they are, and the archive."""
+"""Interfaces of the store of raw data: the rows that say where the samples of recordings are, and the archive."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
@@ -8,30 +8,36 @@ from bench_service.model.raw_data import Candidate, Growth, Hold, RawRule, RawSt
 
 
 class RawDataStore(Protocol):
-    """The places of raw data in the database. Every method is one transaction, but for those that say otherwise."""
+    """Store of the places of raw data. Every method is one transaction, but for those that say otherwise. Interface;
+    the SQL is in `persistence`.
+    """
 
     def candidates(self, rule: RawRule, before: datetime) -> Iterator[Candidate]:
-        """Complete recordings with raw data in the database that are old enough, oldest first; read page by page."""
+        """Yield complete recordings with raw data in the database that are older than `before`, oldest first; read page
+        by page.
+        """
         ...
 
     def of_calibrations(self) -> frozenset[str]:
-        """Recordings on which a current or approved calibration or correction rests, by way of whatever results."""
+        """Return the ids of recordings on which a current or approved calibration or correction rests, by way of
+        whatever results.
+        """
         ...
 
     def held(self) -> frozenset[str]:
-        """Recordings on which a hold stands."""
+        """Return the ids of recordings on which a hold stands."""
         ...
 
     def of_open_analyses(self) -> frozenset[str]:
-        """Recordings that a task wants which has not ended."""
+        """Return the ids of recordings that are inputs of a task which has not ended."""
         ...
 
     def open_campaign_runs(self) -> frozenset[str]:
-        """Ids of the campaign runs that have not ended."""
+        """Return the ids of the campaign runs that have not ended."""
         ...
 
     def unfinished(self) -> tuple[tuple[str, RawState], ...]:
-        """Recordings whose removal, archiving or restoration a crash left half done."""
+        """Return (id, state) of recordings whose removal, archiving or restoration a crash left half done."""
         ...
 
     def remove(self, recording_id: str, at: datetime) -> bool:
@@ -56,15 +62,19 @@ class RawDataStore(Protocol):
         ...
 
     def add_hold(self, hold: Hold) -> Hold:
-        """Add a hold. Raises `NotFound` for the recording, `RawDataRemoved` where there is nothing left to hold."""
+        """Store a hold and return it. Raises `NotFound` for the recording, `RawDataRemoved` where there is nothing left
+        to hold.
+        """
         ...
 
     def release_hold(self, hold_id: str, by: str, at: datetime) -> Hold:
-        """Release a hold. Raises `NotFound`, `IllegalTransition` for one that was released."""
+        """Store the release of a hold and return it. Raises `NotFound`, `IllegalTransition` for one that was
+        released.
+        """
         ...
 
     def holds(self, recording_id: str | None = None) -> tuple[Hold, ...]:
-        """Standing holds, newest first."""
+        """Return the standing holds, of one recording or all, newest first."""
         ...
 
     def archive_at(self, address: str) -> "Archive":
@@ -72,20 +82,26 @@ class RawDataStore(Protocol):
         ...
 
     def shares(self) -> Mapping[RawState, Share]:
-        """Recordings and stored bytes by the place of their raw data."""
+        """Return number of recordings and stored bytes by the place of their raw data (database, archive,
+        removed, …).
+        """
         ...
 
     def growth(self, since: datetime, at: datetime) -> Growth:
-        """The growth of the database's raw data since a moment."""
+        """Return the growth of the database's raw data since a moment [bytes]."""
         ...
 
     def passes_bytes_before(self, moments: Sequence[datetime]) -> tuple[int, ...]:
-        """Stored bytes of routine passes in the database that were made before each of some moments."""
+        """Return, for each of some moments, the stored bytes of routine passes in the database that were made before
+        it.
+        """
         ...
 
 
 class Archive(Protocol):
-    """An archive of chunks and of the tables with them, a Parquet dataset."""
+    """An archive of chunks and of the tables with them, a Parquet dataset. Interface; see
+    `persistence/archive/dataset.py`.
+    """
 
     place: str
     """Its address, as it is kept with each recording."""
@@ -98,8 +114,7 @@ class Archive(Protocol):
         ...
 
     def write_tables(self) -> None:
-        """Bring the tables of units, recordings, chunks, results, quantities and lineage up to date.
-
+        """Write what is new of units, recordings, chunks, results, quantities and lineage into the archive's tables.
         Raises `ArchiveAway`.
         """
         ...

@@ -20,7 +20,7 @@ FIGURES = 30
 
 
 def found_before(stores: EvidenceStores, result: StoredResult) -> dict[str, StoredCalibration]:
-    """Triad -> the calibration that was in use when a result's job began."""
+    """Return, by triad, the calibration that was in use when a result's job began."""
     unit = result.context.get("unit") or {}
     return {c.triad: c for c in stores.calibrations.several(unit.get("calibration_ids") or ())}
 
@@ -38,7 +38,9 @@ def found_and_left(stores: EvidenceStores, one: StoredCalibration, found: Stored
 
 
 def coefficients(one: StoredCalibration, found: StoredCalibration | None) -> Iterator[Block]:
-    """A calibration as left: values to their uncertainty beside those as found, then all values unrounded."""
+    """Yield blocks on a calibration as left: values to their uncertainty with those as found, then all values
+    unrounded.
+    """
     yield Facts(tuple(facts(one)))
     before = {} if found is None else {c.name: c for c in found.coefficients}
     rows: list[tuple[str, ...]] = []
@@ -70,7 +72,7 @@ def coefficients(one: StoredCalibration, found: StoredCalibration | None) -> Ite
 
 
 def facts(one: StoredCalibration) -> Iterator[tuple[str, str]]:
-    """Rows on a calibration's origin, use, approval and validity."""
+    """Yield rows (name, text) on a calibration's origin, use, approval and validity."""
     yield "calibration", one.id
     yield "method", one.method
     yield "origin", one.origin or (f"result {one.result_id}" if one.result_id else "not known")
@@ -85,7 +87,9 @@ def facts(one: StoredCalibration) -> Iterator[tuple[str, str]]:
 
 
 def trends(history: Sequence[StoredCalibration], triad: str) -> Iterator[Figure]:
-    """Biases and diagonal of K of a triad over its calibrations, oldest first, with expanded uncertainties."""
+    """Yield figures of biases and diagonal of K of a triad over its calibrations, oldest first, with expanded
+    uncertainties.
+    """
     shown = [c for c in reversed(history) if c.triad == triad and c.value.output_unit != "count"][-FIGURES:]
     if len(shown) < 2:
         return

@@ -32,7 +32,9 @@ CERTIFICATE = "certificate.xml"
 def certificate_report(
     stores: EvidenceStores, catalogue: Catalogue, read_job: Callable[[str], Job], serial: str, xml: bytes
 ) -> PrintedDocument:
-    """The printed form. Raises `BadParameter` for no certificate, or one whose numbers are not those stored here."""
+    """Return the printed form of a certificate as a document. Raises `BadParameter` for no certificate, or one whose
+    numbers are not those stored here.
+    """
     root, document, calibrations = _read(stores, serial, xml)
     results = {c.result_id: stores.results.get(c.result_id) for c in calibrations if c.result_id is not None}
     identifier = root.findtext(".//dcc:coreData/dcc:uniqueIdentifier", "", SPACES)

@@ -13,7 +13,7 @@ Row = tuple[str, str]
 
 
 def conditions(context: dict[str, Any], recordings: Sequence[StoredRecording]) -> Iterator[Block]:
-    """Site, temperatures, room, supply, rate and time of the recordings."""
+    """Yield the section on conditions: site, temperatures, room, supply, rate and time of the recordings."""
     yield Heading("Conditions")
     site = (context.get("bench") or {}).get("site")
     rows: list[Row] = []

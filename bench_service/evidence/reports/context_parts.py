@@ -13,7 +13,7 @@ NOT_RECORDED = "not recorded"
 
 
 def identity(context: dict[str, Any], serial: str) -> Iterator[Block]:
-    """The unit as the job found it."""
+    """Yield the section on the unit as the job found it: serial, declaration, channels."""
     unit = context.get("unit") or {}
     declared = unit.get("declaration") or {}
     channels = ", ".join(c["name"] for c in unit.get("channels", ()))
@@ -34,7 +34,7 @@ def identity(context: dict[str, Any], serial: str) -> Iterator[Block]:
 
 
 def mounting(context: dict[str, Any]) -> Iterator[Block]:
-    """The mounting, and the azimuth on which the job rested."""
+    """Yield the section on the mounting, and the azimuth on which the job rested."""
     yield Heading("Mounting")
     found = context.get("mounting")
     if found:
@@ -53,7 +53,8 @@ def mounting(context: dict[str, Any]) -> Iterator[Block]:
 
 
 def instruments(context: dict[str, Any], at: datetime) -> Iterator[Block]:
-    """Devices of the bench with their certificates, those overdue at a time marked, and the table's accuracy.
+    """Yield the section on devices of the bench with their certificates, those overdue at a time marked, and the
+    table's accuracy.
 
     `at`: the time of the recordings (`recorded_at`).
     """
@@ -84,7 +85,8 @@ def instruments(context: dict[str, Any], at: datetime) -> Iterator[Block]:
 
 
 def recorded_at(result: StoredResult, job: Job | None, recordings: Sequence[StoredRecording]) -> datetime:
-    """The time by which certificates of instruments are judged: a result that is computed again later has the same.
+    """Return the time by which certificates of instruments are judged: a result that is computed again later has the
+    same.
 
     It is the job's, as of the result's own warnings; without a job, that of the first recording.
     """
@@ -102,7 +104,7 @@ def _due(certificate: dict[str, Any], at: datetime) -> str:
 
 
 def hashes(recordings: Sequence[tuple[str, str]]) -> Iterator[Block]:
-    """Raw data by their content hashes."""
+    """Yield the section on raw data: recordings with their content hashes."""
     yield Heading("Raw data")
     rows = tuple((str(number), one, digest) for number, (one, digest) in enumerate(recordings, start=1))
     note = "The hash is the SHA-256 of channels, scales, rate and samples."

@@ -23,12 +23,12 @@ NOT_SEEN = "≤: no launch showed the process; the value is the one to plan with
 
 
 def origin(record: TriadRecord | None) -> str:
-    """Origin of a triad's noise in the record: a data sheet, or a result."""
+    """Return the origin of a triad's noise in the record as text: a data sheet, or a result."""
     return "nothing is known" if record is None else record.noise_origin
 
 
 def noise(unit: Unit) -> Iterator[PrintedTable]:
-    """Noise of each triad whose noise is known, in the units that people read."""
+    """Yield a table of the noise of each triad whose noise is known, in the units that people read."""
     for triad, channels in TRIADS.items():
         record = unit.triad(triad)
         if record is None:
@@ -44,7 +44,7 @@ def noise(unit: Unit) -> Iterator[PrintedTable]:
 
 
 def noise_change(before: Unit, after: Unit) -> Iterator[PrintedTable]:
-    """Noise of the channels whose record the result changed, as found and as left."""
+    """Yield a table of the noise of channels whose record the result changed, as found and as left."""
     rows: list[tuple[str, ...]] = []
     for triad, channels in TRIADS.items():
         old, new = before.triad(triad), after.triad(triad)
@@ -62,7 +62,8 @@ def noise_change(before: Unit, after: Unit) -> Iterator[PrintedTable]:
 def noise_trends(
     stores: EvidenceStores, serial: str, simulated: bool, newest: StoredResult | None = None
 ) -> Iterator[Figure]:
-    """Noise coefficients over the unit's static launches, oldest first; none with fewer than two results.
+    """Yield figures of noise coefficients over the unit's static launches, oldest first; none with fewer than two
+    results.
 
     `newest`: only this result and older ones; None: up to the unit's newest.
     """

@@ -13,17 +13,17 @@ REMARKS = 50
 
 
 def moment(at: datetime | None) -> str:
-    """A time to the second, in UTC with the zone named; a dash for none."""
+    """Return a time to the second as text, in UTC with the zone named; a dash for None."""
     return "–" if at is None else f"{at.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def named(by: str, proven: bool) -> str:
-    """Name of a person, marked where the request declared it without a log-in; empty for none."""
+    """Return the name of a person, marked where the request declared it without a log-in; empty for none."""
     return by if proven or not by else f"{by} (name as given)"
 
 
 def people(result: StoredResult, job: Job | None) -> Iterator[Block]:
-    """The person who asked, and the times of the job and of the result."""
+    """Yield the rows on who asked for the work, and on the times of the job and of the result."""
     yield Heading("Who and when")
     rows = [("result", moment(result.created_at))]
     if job is not None:
@@ -40,7 +40,7 @@ def people(result: StoredResult, job: Job | None) -> Iterator[Block]:
 
 
 def remarks(notes: Sequence[UnitNote]) -> Iterator[Block]:
-    """Remarks about the unit, newest first; nothing where there are none."""
+    """Yield the section of remarks about the unit, newest first; nothing where there are none."""
     if not notes:
         return
     yield Heading("Remarks about the unit")

@@ -16,7 +16,9 @@ TIME_S = 60.0
 
 
 def open_printing() -> Run:
-    """Prepare a printing process, see `WorkProcesses`: a piece of work is a document, and gives its PDF in base64."""
+    """Return the function that a printing process runs, see `WorkProcesses`: it takes a document and returns its PDF in
+    base64.
+    """
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     most = MEMORY_BYTES if hard == resource.RLIM_INFINITY else min(hard, MEMORY_BYTES)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))

@@ -1,6 +1,7 @@
 """The unit's record in a printed report: noise and what is in use, as a job found them and as its result left them."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -9,14 +10,13 @@ from bench_service.evidence.reports.noise_parts import noise_change, origin
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.printed.document import Block, PrintedTable
 from bench_service.model.calibrations import StoredCalibration
+from bench_service.model.context import unit_document
 from bench_service.model.errors import NotFound
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 from procedures.core.errors import DomainError
 from procedures.core.recording import TRIADS
 from procedures.core.unit import CORRECTION_IDS, TriadRecord, Unit
-
-UNIT: TypeAdapter[Unit] = TypeAdapter(Unit)
 
 
 def found_and_left(
@@ -27,7 +27,9 @@ def found_and_left(
     given: Sequence[StoredCalibration],
     job: Job | None,
 ) -> Iterator[Block]:
-    """Return what was in use when the job began next to what the result gave, and noise where it changed."""
+    """Yield the section on what was in use when the job began next to what the result gave, and noise where it
+    changed.
+    """
     unit = result.context.get("unit")
     if not unit:
         return
@@ -61,10 +63,15 @@ def _corrections(stores: EvidenceStores, result: StoredResult) -> dict[str, str]
     return {c.correction.kind: c.id for c in found if c.result_id == result.id}
 
 
+@cache
+def _adapter() -> TypeAdapter[Unit]:
+    return TypeAdapter(Unit)
+
+
 def _units(catalogue: Catalogue, result: StoredResult, of_job: bool) -> tuple[Unit | None, Unit | None]:
     """The unit as the job found it, and as the job's own result left it; None where this release cannot read one."""
     try:
-        before = UNIT.validate_python(result.context["unit"])
+        before = _adapter().validate_python(unit_document(result.context))
         if not of_job:
             return before, before
         entry = catalogue.procedure(result.name)

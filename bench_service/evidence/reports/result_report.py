@@ -40,7 +40,7 @@ SIMPLE = "simple acceptance, the uncertainty of a value is not taken off"
 
 @dataclass(frozen=True)
 class ResultReport:
-    """A result with everything that its report is made of."""
+    """A result with all that its printed report is made of: its job, its calibrations, and those found before."""
 
     result: StoredResult
     job: Job | None
@@ -51,13 +51,15 @@ class ResultReport:
 
 
 def gathered(stores: EvidenceStores, result: StoredResult, job: Job | None) -> ResultReport:
-    """Gather what a result's report needs."""
+    """Read what a result's report needs from the stores."""
     given = stores.calibrations.of_results([result.id])
     return ResultReport(result, job, tuple(given), calibration_parts.found_before(stores, result))
 
 
 def result_report(stores: EvidenceStores, catalogue: Catalogue, of: ResultReport) -> PrintedDocument:
-    """The report of a result: identity, mounting, instruments, conditions, results, plots, verdict, people, hashes."""
+    """Return the printed report of a result: identity, mounting, instruments, conditions, results, plots, verdict,
+    people, hashes.
+    """
     result, attached = of.result, _attached(of.result)
     blocks = [*_head(of), *context_parts.identity(result.context, result.unit or "none")]
     blocks += record_parts.found_and_left(stores, catalogue, result, of.found, of.calibrations, of.job)
@@ -123,7 +125,7 @@ def _head(of: ResultReport) -> Iterator[Block]:
 
 
 def verdict_blocks(result: StoredResult) -> Iterator[Block]:
-    """The verdict with its decision rule, its checks and the warnings."""
+    """Yield the section on the verdict: its decision rule, its checks and the warnings."""
     yield Heading("Verdict")
     yield Paragraph(f"{result.verdict.value.upper()}. {_rule(result.document)}")
     checks = result.document.get("checks", [])

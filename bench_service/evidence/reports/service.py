@@ -13,7 +13,7 @@ from bench_service.model.job import Job
 
 
 class ReportService:
-    """Makes printed reports from what is stored."""
+    """Makes printed reports from what is stored, and has them typeset in a printing process."""
 
     def __init__(
         self,
@@ -29,17 +29,21 @@ class ReportService:
         self._processes = processes
 
     def of_result(self, result_id: str) -> bytes:
-        """The report of a result, with its document attached. Raises `NotFound`."""
+        """Return the report of a result as PDF/A-3, with its document attached. Waits for the typesetting. Raises
+        `NotFound`.
+        """
         result = self._stores.results.get(result_id)
         job = None if result.job_id is None else self._read_job(result.job_id)
         return self._typeset(result_report(self._stores, self._catalogue, gathered(self._stores, result, job)))
 
     def of_unit(self, serial: str) -> bytes:
-        """The report of a unit. Raises `NotFound`."""
+        """Return the report of a unit as PDF/A-3. Waits for the typesetting. Raises `NotFound`."""
         return self._typeset(unit_report(self._stores, serial))
 
     def of_certificate(self, serial: str, xml: str) -> bytes:
-        """The printed form of a unit's certificate, which is attached byte for byte. Raises `BadParameter`."""
+        """Return the printed form of a unit's certificate as PDF/A-3, to which the XML is attached byte for byte. Waits
+        for the typesetting. Raises `BadParameter`.
+        """
         from bench_service.evidence.reports.certificate_report import certificate_report  # with scipy and signxml
 
         return self._typeset(certificate_report(self._stores, self._catalogue, self._read_job, serial, xml.encode()))

@@ -17,7 +17,7 @@ RESULTS = 20
 
 
 def unit_report(stores: EvidenceStores, serial: str) -> PrintedDocument:
-    """The report of a unit as it is known now. Raises `NotFound`."""
+    """Return the printed report of a unit as it is known now. Raises `NotFound`."""
     unit = stores.units.unit(serial)
     history = stores.calibrations.list(serial, limit=200).items
     results = stores.results.list(unit=serial, limit=RESULTS).items
@@ -106,12 +106,13 @@ def _corrections(corrections: tuple[StoredCorrection, ...]) -> Iterator[Block]:
             c.correction.kind,
             c.id,
             c.result_id,
+            c.verdict.value,
             "in use" if c.current else "",
             c.approval.value,
         )
         for c in corrections
     )
-    yield PrintedTable("", ("day", "kind", "correction", "result", "", "approval"), rows)
+    yield PrintedTable("", ("day", "kind", "correction", "result", "verdict", "", "approval"), rows)
 
 
 def _results(results: tuple[StoredResult, ...]) -> Iterator[Block]:

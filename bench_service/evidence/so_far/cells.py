@@ -17,7 +17,7 @@ MOST = 8192
 
 @dataclass
 class CellsSoFar:
-    """Cell means of all channels of one recording."""
+    """Cell means of all channels of one recording that grows, and the samples that do not fill a cell yet."""
 
     rates: Array
     """Shape (channels, n), each in its channel's rate unit."""
@@ -29,7 +29,7 @@ class CellsSoFar:
     waiting: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     def add(self, rows: Array) -> None:
-        """Take in the next nominal rates, shape (channels, n)."""
+        """Take in the next nominal rates, shape (channels, n); each full cell becomes a mean."""
         whole = np.concatenate([self.waiting, rows], axis=1) if self.waiting.size else rows
         count = whole.shape[1] // self.samples
         cells = whole[:, : count * self.samples].reshape(len(whole), count, self.samples).mean(axis=2)
@@ -50,7 +50,7 @@ class CellsSoFar:
 
 
 class KeptCells:
-    """Cells of the recordings that were looked at last."""
+    """Memory of the cells of the recordings that were looked at last, so that each look reads only new samples."""
 
     def __init__(self, most: int) -> None:
         """Set up for at most `most` recordings."""
@@ -58,7 +58,7 @@ class KeptCells:
         self._known: OrderedDict[str, CellsSoFar] = OrderedDict()
 
     def of(self, recording: RecordingSoFar) -> CellsSoFar:
-        """The cells of a recording's stored part: only what is new since the last look is read."""
+        """Return the cells of a recording's stored part; reads only what is new since the last look."""
         info = recording.info
         found = self._known.pop(info.id, None)
         if found is None:

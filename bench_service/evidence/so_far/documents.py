@@ -1,4 +1,4 @@
-"""Estimates so far of a job, as JSON."""
+"""Shape of the JSON of a job's estimates so far, from the recorded part of the job."""
 
 from pydantic import BaseModel, Field
 
@@ -29,7 +29,7 @@ class BiasDocument(BaseModel):
 
 
 class DwellEstimates(BaseModel):
-    """Estimates of the recording that is being made, or of the last one."""
+    """Estimates of the recording that is being made, or of the last one: Allan deviations and biases by channel."""
 
     recording: str
     station: int | None
@@ -41,7 +41,7 @@ class DwellEstimates(BaseModel):
 
 
 class CoefficientSoFar(BaseModel):
-    """A coefficient after the first station, the second, …"""
+    """Values of one coefficient after the first station, the second, …, with their standard uncertainties."""
 
     name: str
     unit: str
@@ -51,7 +51,7 @@ class CoefficientSoFar(BaseModel):
 
 
 class TriadEstimates(BaseModel):
-    """Coefficients of a triad after each station."""
+    """Coefficients of a triad after each station of the job so far."""
 
     triad: str
     noise_known: bool
@@ -59,7 +59,7 @@ class TriadEstimates(BaseModel):
 
 
 class JobEstimates(BaseModel):
-    """Estimates of a job from what is recorded so far. The result has the final ones."""
+    """Estimates of a job from its recorded part. The result has the final ones."""
 
     job: str
     stations_done: int

@@ -1,4 +1,4 @@
-"""Work out the estimates of a job so far: numerics that the process which drives a bench does not load."""
+"""Computes the estimates of a job so far: numerics that the process which drives a bench does not load."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -41,14 +41,14 @@ _SITE = ("latitude_deg", "gravity_m_s2", "azimuth_deg", "azimuth_sd_arcsec")
 
 @dataclass
 class Estimating:
-    """Works estimates out; cells of the recordings that grow are kept from one look to the next."""
+    """Computes estimates of jobs under way; cells of the recordings that grow are kept from one look to the next."""
 
     stores: EvidenceStores
     read_job: Callable[[str], Job]
     _cells: KeptCells = field(default_factory=lambda: KeptCells(KEPT))
 
     def text(self, job_id: str) -> str:
-        """Work the estimates of a job out; the JSON of a `JobEstimates`."""
+        """Return the estimates of a job so far, as the JSON text of a `JobEstimates`."""
         job = self.read_job(job_id)
         context = context_of(job, self.stores.calibrations.several)
         done = [self.stores.recordings.load(stored.info.id) for stored in self.stores.recordings.of_job(job_id)]

@@ -23,7 +23,7 @@ class _Remembered:
 
 
 class EstimateService:
-    """Estimates so far of jobs, by their ids."""
+    """Has estimates of jobs under way computed in another process, for the API."""
 
     def __init__(
         self, work_out: Callable[[str], str], read_job: Callable[[str], Job], processes: WorkProcesses | None = None
@@ -36,7 +36,9 @@ class EstimateService:
         self._mutex = Lock()
 
     def of_job(self, job_id: str) -> JobEstimates:
-        """Estimates of a job from what is recorded. Raises `NotFound`, and `Overloaded` where too much work waits."""
+        """Wait for the estimates of a job from what is recorded, and return them. Raises `NotFound`, and `Overloaded`
+        where too much work waits.
+        """
         with self._mutex:
             known = self._known.get(job_id)
         if known is None or monotonic_s() - known.at_s >= FRESH_S:

@@ -21,7 +21,9 @@ class InverseModel:
 
 
 def inverse_model(calibration: TriadCalibration) -> InverseModel:
-    """Invert a calibration; ``dA = −A·dK·A``, ``dc = −A·(db + dK·c)`` give the covariance to first order."""
+    """Return the inverse model of a calibration; ``dA = −A·dK·A``, ``dc = −A·(db + dK·c)`` give its covariance to first
+    order.
+    """
     a: Array = np.asarray(np.linalg.inv(calibration.matrix_array), dtype=np.float64)
     c = -a @ calibration.bias_array
     jacobian = np.empty((12, 12))
@@ -39,7 +41,7 @@ def inverse_model(calibration: TriadCalibration) -> InverseModel:
 
 
 def triangle_and_rotation(matrix: Array) -> tuple[Array, Array]:
-    """Split ``K = L·Q``: L lower triangular with a positive diagonal, Q orthogonal; both (3, 3).
+    """Return L and Q of ``K = L·Q``: L lower triangular with a positive diagonal, Q orthogonal; both (3, 3).
 
     Q is a rotation where det K > 0; for a unit whose axes are left-handed Q has the determinant −1.
     """

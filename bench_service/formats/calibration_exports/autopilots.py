@@ -17,7 +17,9 @@ SCALES = (0.8, 1.2)
 
 
 def ardupilot(subject: CalibrationSubject) -> str:
-    """Parameter file of ArduPilot for its first IMU: ``NAME,VALUE`` lines."""
+    """Return the text of ArduPilot's parameter file for its first IMU: ``NAME,VALUE`` lines. Raises `BadParameter`
+    where it cannot hold the calibration.
+    """
     values = _offsets(subject, "ardupilot", "INS_ACCOFFS_{axis}", "INS_ACCSCAL_{axis}", "INS_GYROFFS_{axis}")
     remarks = [
         *_losses(subject),
@@ -28,7 +30,9 @@ def ardupilot(subject: CalibrationSubject) -> str:
 
 
 def px4(subject: CalibrationSubject) -> str:
-    """Parameter file of PX4 for its first sensors, as QGroundControl loads it: tabs, type 9 is a 32-bit float."""
+    """Return the text of PX4's parameter file for its first sensors, as QGroundControl loads it: tabs, type 9 is a
+    32-bit float. Raises `BadParameter`.
+    """
     values = _offsets(subject, "px4", "CAL_ACC0_{axis}OFF", "CAL_ACC0_{axis}SCALE", "CAL_GYRO0_{axis}OFF")
     remarks = [
         *_losses(subject),
@@ -66,7 +70,9 @@ def _losses(subject: CalibrationSubject) -> list[str]:
 
 
 def lost(one: TriadExport) -> np.ndarray:
-    """Largest error of what is not corrected, (3,): at one g, or 100 deg/s, along every axis, in the input's unit."""
+    """Return the largest error of what is not corrected, (3,): at one g, or 100 deg/s, along every axis, in the input's
+    unit.
+    """
     matrix = one.value.matrix_array
     if one.triad == "accelerometer":
         rest = np.abs(matrix - np.diag(np.diagonal(matrix))).sum(axis=1)

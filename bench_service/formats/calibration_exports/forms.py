@@ -33,7 +33,7 @@ class CalibrationForm(StrEnum):
 
 
 class ExportedCalibration(NamedTuple):
-    """File of an exported calibration."""
+    """An exported calibration: name of the file, media type, text."""
 
     name: str
     media_type: str
@@ -71,11 +71,13 @@ MEDIA_TYPES = tuple(dict.fromkeys(form.media_type.split(";")[0] for form in _FOR
 
 
 def takes_one_triad(form: CalibrationForm) -> bool:
-    """Whether a form can hold one triad alone; the others need both."""
+    """Return whether a form can hold one triad alone; the others need both."""
     return _FORMS[form].alone
 
 
 def exported(subject: CalibrationSubject, form: CalibrationForm) -> ExportedCalibration:
-    """Write a calibration in a form. Raises `BadParameter` where the form cannot hold it, with the way out."""
+    """Return a calibration as a file in a form. Raises `BadParameter` where the form cannot hold it, with the way
+    out.
+    """
     writer, ending, media_type, _ = _FORMS[form]
     return ExportedCalibration(f"{subject.unit}-{form.value}.{ending}", media_type, writer(subject))

@@ -15,7 +15,9 @@ FORMAT_VERSION = "2.0.0"
 
 
 def imucal(subject: CalibrationSubject) -> str:
-    """JSON that ``imucal.management.load_calibration_info`` reads; it takes raw outputs in the unit named there."""
+    """Return the JSON that ``imucal.management.load_calibration_info`` reads; it takes raw outputs in the unit named
+    there. Raises `BadParameter`.
+    """
     force, rate = subject.required("accelerometer", "imucal"), subject.required("gyro", "imucal")
     b_a, k_a, r_a, acc_unit = _parts(force, 1.0)
     b_g, k_g, r_g, gyr_unit = _parts(rate, DEG)

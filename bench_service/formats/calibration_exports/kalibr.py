@@ -18,14 +18,16 @@ FRAME = (
 
 
 def kalibr_noise(subject: CalibrationSubject) -> str:
-    """Kalibr's imu.yaml: noise of the noisiest channel, in densities."""
+    """Return the text of Kalibr's imu.yaml: noise of the noisiest channel, in densities. Raises `BadParameter` where a
+    noise is unknown.
+    """
     subject.require_noise("kalibr-imu")
     lines = commented(subject, "#", *_noise_remarks(subject))
     return "\n".join([*lines, *_noise(subject), "rostopic: /imu0", f"update_rate: {_number(subject.rate_hz)}"]) + "\n"
 
 
 def kalibr_intrinsics(subject: CalibrationSubject) -> str:
-    """Kalibr's result with intrinsics of the model "scale-misalignment"."""
+    """Return the text of Kalibr's result with intrinsics of the model "scale-misalignment". Raises `BadParameter`."""
     force, rate, turn, rotation = _split(subject, "kalibr")
     lines = commented(subject, "#", *FRAME, *_lost(subject))
     lines += ["imu0:", *_identity("  T_i_b", 4)]
@@ -44,7 +46,9 @@ def kalibr_intrinsics(subject: CalibrationSubject) -> str:
 
 
 def openvins(subject: CalibrationSubject) -> str:
-    """OpenVINS' kalibr_imu_chain.yaml of the model "kalibr"; its reader keeps lower triangles only."""
+    """Return the text of OpenVINS' kalibr_imu_chain.yaml of the model "kalibr"; its reader keeps lower triangles only.
+    Raises `BadParameter`.
+    """
     subject.require_noise("openvins")
     force, rate, turn, rotation = _split(subject, "openvins")
     lines = ["%YAML:1.0", "---", *commented(subject, "#", *FRAME, *_noise_remarks(subject), *_lost(subject))]

@@ -8,7 +8,7 @@ from procedures.core.arrays import Array
 
 
 def matlab_rows(subject: CalibrationSubject) -> str:
-    """Script that sets ``A_gyro, b_gyro, A_accelerometer, b_accelerometer`` for samples in rows."""
+    """Return a script that sets ``A_gyro, b_gyro, A_accelerometer, b_accelerometer`` for samples in rows."""
     lines = commented(
         subject, "%", "samples U are rows, n-by-3: C = U*A + b; b is added (accelcal's and magcal's form)"
     )
@@ -21,7 +21,8 @@ def matlab_rows(subject: CalibrationSubject) -> str:
 
 
 def psins(subject: CalibrationSubject) -> str:
-    """Script with a call of PSINS' ``imuerrset`` for simulations with this unit's errors, U = (I + dK)·v + b.
+    """Return a script with a call of PSINS' ``imuerrset`` for simulations with this unit's errors, U = (I + dK)·v + b.
+    Raises `BadParameter`.
 
     Numbers are SI divided by the toolbox's own constants, so its size of a µg is the one that counts.
     """

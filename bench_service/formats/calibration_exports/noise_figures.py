@@ -1,4 +1,4 @@
-"""Noise of a unit for pyins and NaveGo."""
+"""Noise of a unit as files for pyins and NaveGo."""
 
 import json
 from typing import Any
@@ -38,7 +38,9 @@ def pyins(subject: CalibrationSubject) -> str:
 
 
 def navego(subject: CalibrationSubject) -> str:
-    """Script with the fields of NaveGo's IMU structure that it converts by ``imu_si_errors``; static biases are b."""
+    """Return a script with the fields of NaveGo's IMU structure that it converts by ``imu_si_errors``; static biases
+    are b. Raises `BadParameter`.
+    """
     subject.require_noise("navego")
     force, rate = subject.required_si("accelerometer", "navego").value, subject.required_si("gyro", "navego").value
     f, w = subject.noise["accelerometer"], subject.noise["gyro"]

@@ -25,7 +25,7 @@ FRAME = (
 
 
 def own_json(subject: CalibrationSubject) -> str:
-    """The JSON document as text; its numbers are the stored ones to the last bit."""
+    """Return the JSON document as text; its numbers are the stored ones to the last bit."""
     document: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,

@@ -57,7 +57,7 @@ MODEL = "v = A*(U - b), A the inverse of K; U is the nominal output scale*(raw -
 
 
 def c_source(subject: CalibrationSubject) -> str:
-    """C99 header with one function a triad: ``correct_gyro(u, v)`` and ``correct_accelerometer(u, v)``."""
+    """Return a C99 header with one function a triad: ``correct_gyro(u, v)`` and ``correct_accelerometer(u, v)``."""
     guard = "CALIBRATION_" + re.sub(r"[^A-Z0-9]", "_", subject.unit.upper())
     head = [f"/* {line.replace('*/', '* /')} */" for line in (*subject.remarks(), MODEL)]
     functions = [C_FUNCTION.format(**_numbers(t, "    {%s}", ",\n")) for t in subject.triads]
@@ -65,7 +65,7 @@ def c_source(subject: CalibrationSubject) -> str:
 
 
 def python_source(subject: CalibrationSubject) -> str:
-    """Python module with one function a triad, for one sample or for samples in rows; it imports nothing."""
+    """Return a Python module with one function a triad, for one sample or for samples in rows; it imports nothing."""
     head = "\n".join(commented(subject, "#", MODEL))
     rows = "    (%s),"
     return (

@@ -54,11 +54,13 @@ class CalibrationSubject:
     noise_origin: dict[str, str] = field(default_factory=dict[str, str])
 
     def triad(self, name: str) -> TriadExport | None:
-        """The export of a triad by its name, or None."""
+        """Return the calibration of a triad by its name; None where the subject has none."""
         return next((t for t in self.triads if t.triad == name), None)
 
     def required(self, name: str, form: str) -> TriadExport:
-        """The export of a triad that a form needs. Raises `BadParameter` with the way out."""
+        """Return the calibration of a triad that a form needs. Raises `BadParameter` with the way out where there is
+        none.
+        """
         found = self.triad(name)
         if found is None:
             allowed = f"a form that takes one triad: {form} needs the {name} triad too, give its calibration as `other`"
@@ -66,7 +68,9 @@ class CalibrationSubject:
         return found
 
     def required_si(self, name: str, form: str) -> TriadExport:
-        """The same, of a calibration of outputs in SI units. Raises `BadParameter` for one of counts."""
+        """Return the calibration of a triad whose outputs are in SI units. Raises `BadParameter` for one of counts, or
+        none.
+        """
         found = self.required(name, form)
         if found.value.output_unit != SI_UNITS[name]:
             allowed = (
@@ -88,7 +92,7 @@ class CalibrationSubject:
                 )
 
     def remarks(self) -> tuple[str, ...]:
-        """Sentences that begin a file as its comments: origin, validity, and what else must be known."""
+        """Return the sentences that begin a file as its comments: origin, validity, and what else must be known."""
         lines = [f"calibration of unit {self.unit}, exported at {self.exported_at}"]
         for t in self.triads:
             source = f"origin {t.origin}" if t.origin else f"verdict {t.verdict}"
@@ -109,5 +113,5 @@ class CalibrationSubject:
 
 
 def commented(subject: CalibrationSubject, mark: str, *more: str) -> list[str]:
-    """Lines of comment: the subject's remarks and what a form has to say besides."""
+    """Return lines of comment for a file: the subject's remarks and those of the form, each begun by `mark`."""
     return [f"{mark} {line}".rstrip() for line in (*subject.remarks(), *more)]

@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from math import sqrt
 from typing import Any
 
-from scipy.stats import chi2
-
 from bench_service.formats.certificate.laboratory import Contact, Laboratory
 from bench_service.formats.certificate.tree import Element, etree
 
@@ -44,7 +42,9 @@ DECISION_RULE = "simple acceptance: the value is compared with its limit, its un
 
 
 def certificate(document: Mapping[str, Any], text: str, laboratory: Laboratory, software: str) -> Element:
-    """The certificate of an exported calibration, unsigned. `text`: the JSON as exported; `software`: its release."""
+    """Return the certificate of an exported calibration as an XML tree, unsigned. `text`: the JSON as exported;
+    `software`: its release. Raises `CertificateRefused`.
+    """
     root = etree.Element(f"{{{DCC}}}digitalCalibrationCertificate", nsmap=SPACES, schemaVersion=VERSION)
     _administrative(_dcc(root, "administrativeData"), document, laboratory, software)
     results = _dcc(root, "measurementResults")
@@ -174,6 +174,8 @@ def _equipment(parent: Element, laboratory: Laboratory) -> None:
 
 
 def _coefficients(parent: Element, triad: Mapping[str, Any]) -> None:
+    from scipy.stats import chi2  # with all of scipy's statistics: only where it is called
+
     rows, covariance = triad["coefficients"], triad["covariance"]["matrix"]
     units = [UNITS[row["unit"]] for row in rows]
     _si(parent, "labelXMLList", " ".join(row["name"] for row in rows))

@@ -1,4 +1,4 @@
-"""Refusals of certificates: what cannot be made, signed, read or believed."""
+"""Refusals of certificates that cannot be made, signed, read or trusted."""
 
 
 class CertificateRefused(Exception):

@@ -57,7 +57,9 @@ class Laboratory(BaseModel):
 
 
 def laboratory_of(text: str) -> Laboratory:
-    """Read the file. Raises `CertificateRefused` naming the field and the way out."""
+    """Return the content of a laboratory's file, checked. Raises `CertificateRefused` naming the field and the
+    way out.
+    """
     try:
         return Laboratory.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:

@@ -12,7 +12,7 @@ NEGLIGIBLE = 1e-6
 
 @dataclass(frozen=True)
 class Repeated:
-    """Outcome for one triad: whether its raw data and numbers are the same, in a sentence."""
+    """Outcome of the comparison for one triad: whether its raw data and numbers are the same, with a sentence."""
 
     triad: str
     same: bool
@@ -20,13 +20,15 @@ class Repeated:
 
 
 def results_of(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Ids of the results that the attached document rests on; none for entered coefficients."""
+    """Return the ids of the results that the attached document rests on; none for entered coefficients."""
     found = [triad["lineage"]["result"] for triad in document["triads"] if triad.get("lineage")]
     return tuple(dict.fromkeys(found))
 
 
 def compared(document: Mapping[str, Any], answers: Mapping[str, Mapping[str, Any]]) -> list[Repeated]:
-    """Compare each triad with the recomputation of its result (result id -> answer of the service)."""
+    """Return the comparison of each triad with the recomputation of its result. `answers`: result id -> answer of the
+    service.
+    """
     return [_compared(triad, answers) for triad in document["triads"]]
 
 

@@ -15,7 +15,9 @@ from procedures.core.arrays import Array
 
 
 def faults(root: Element) -> list[str]:
-    """Sentences on what is wrong; empty where nothing is."""
+    """Return the faults of a certificate by the rules that its schema does not check, a sentence each; empty where
+    there is none.
+    """
     found: list[str] = []
     if root.tag != f"{{{DCC}}}digitalCalibrationCertificate" or root.get("schemaVersion") != VERSION:
         return [f"no certificate of version {VERSION}: {etree.QName(root).localname} {root.get('schemaVersion')}"]
@@ -26,7 +28,9 @@ def faults(root: Element) -> list[str]:
 
 
 def schema_faults(root: Element, folder: Path) -> list[str]:
-    """Faults by the schema in a folder, ``v3.3.0/dcc.xsd``. Raises `CertificateRefused` where there is none."""
+    """Return the faults by the schema in a folder, ``v3.3.0/dcc.xsd``, a sentence each. Raises `CertificateRefused`
+    where there is no schema.
+    """
     file = folder / f"v{VERSION}" / "dcc.xsd"
     if not file.is_file():
         raise CertificateRefused(f"there is no {file}: the folder of the schema has v{VERSION}/dcc.xsd and its imports")
@@ -83,7 +87,9 @@ def _faults_of_covariance(matrix: Array, expanded: Array) -> list[str]:
 
 
 def attached(root: Element) -> dict[str, Any]:
-    """The attached JSON. Raises `CertificateRefused` where there is none that can be read."""
+    """Return the JSON document that is attached to a certificate. Raises `CertificateRefused` where there is none that
+    can be read.
+    """
     one = root.find("dcc:document", SPACES)
     name = None if one is None else one.findtext("dcc:fileName", None, SPACES)
     if one is None or name != ATTACHED:

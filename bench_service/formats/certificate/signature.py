@@ -37,7 +37,7 @@ class KeyPair:
 
 
 def new_key(name: str) -> KeyPair:
-    """A key of a laboratory with a certificate signed by itself, for digital signatures only."""
+    """Return a new key of a laboratory, with a certificate signed by itself, for digital signatures only."""
     key = rsa.generate_private_key(public_exponent=65537, key_size=BITS)
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name[:64])])
     usage = x509.KeyUsage(True, False, False, False, False, False, False, False, False)
@@ -60,7 +60,9 @@ def new_key(name: str) -> KeyPair:
 
 
 def signed(root: Element, pair: KeyPair) -> bytes:
-    """The document with its signature as its last element. Raises `CertificateRefused` for a key that cannot sign."""
+    """Return the document with its signature as its last element. Raises `CertificateRefused` for a key that cannot
+    sign.
+    """
     signer = XMLSigner(c14n_algorithm=C14N)  # enveloped, RSA-SHA256 and SHA-256 are its defaults
     try:
         made = signer.sign(root, key=pair.key, cert=pair.certificate.decode())
@@ -70,7 +72,9 @@ def signed(root: Element, pair: KeyPair) -> bytes:
 
 
 def parsed(data: bytes) -> Element:
-    """Read XML without entities and network. Raises `CertificateRefused` with the place of the fault."""
+    """Return the tree of an XML text, read without entities and network. Raises `CertificateRefused` with the place of
+    the fault.
+    """
     try:
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False))
     except etree.XMLSyntaxError as error:
@@ -81,7 +85,9 @@ def parsed(data: bytes) -> Element:
 
 
 def verified(data: bytes, certificate: bytes) -> tuple[Element, str]:
-    """Tree that the signature covers, and the name in the pinned certificate. Raises `CertificateRefused`."""
+    """Return the tree that the signature covers, and the name in the pinned certificate. Raises `CertificateRefused`
+    where the signature does not hold.
+    """
     root = parsed(data)
     found = root.findall(f"{{{DS}}}Signature")
     if len(found) != 1 or root[-1] is not found[0]:

@@ -1,4 +1,4 @@
-"""Library of XML trees, which has no types: here it gets one name for its elements."""
+"""Access to lxml, which has no types: here its elements get one name."""
 
 from importlib import import_module
 from typing import Any

@@ -37,7 +37,7 @@ Stamps = NDArray[np.int64] | Array
 
 @dataclass(frozen=True)
 class Fall:
-    """A place where the time falls: the row before it, counted from 1, and the stamps of that row and the next."""
+    """A place where the time decreases: the row before it, counted from 1, and the stamps of that row and the next."""
 
     row: int
     before: int | float
@@ -48,7 +48,9 @@ class Fall:
 
 @dataclass
 class ClockColumn:
-    """The stamps of one file. `scale_s`: seconds in one unit; `unwrap`: whether wraps are carried on."""
+    """The stamps of one file, kept in a temporary file. `scale_s`: seconds in one unit; `unwrap`: whether wraps of the
+    counter are carried on.
+    """
 
     scale_s: float
     unwrap: bool
@@ -97,7 +99,7 @@ class ClockColumn:
         self._times.write(time_s.tobytes())
 
     def close(self) -> None:
-        """Free the memory of the stamps."""
+        """Free the memory of the stamps; they cannot be read afterwards."""
         self._times.close()
 
     def _relative(self, stamps: Stamps) -> Array:
@@ -156,18 +158,18 @@ class ClockColumn:
         return np.concatenate(self._repeats)
 
     def read(self, start: int, stop: int) -> Array:
-        """Seconds since the first stamp of the rows start … stop − 1."""
+        """Return the rows start … stop − 1 as seconds since the first stamp, (n,)."""
         self._times.seek(8 * start)
         return np.frombuffer(self._times.read(8 * (stop - start)), np.float64)
 
     @property
     def duration_s(self) -> float:
-        """Return the time from the first stamp to the last [s]."""
+        """Time from the first stamp to the last [s]."""
         return self._last_s
 
 
 def windows(count: int, length: int, most: int) -> Sequence[tuple[int, int]]:
-    """Select stretches of the given length evenly over `count` rows, up to a largest number of them."""
+    """Return at most `most` stretches (start, stop) of the given length, evenly over `count` rows."""
     whole = max(1, count // length)
     picked = np.unique(np.linspace(0, whole - 1, min(most, whole)).astype(int))
     return [(int(p) * length, min(count, int(p + 1) * length + 1)) for p in picked]

@@ -20,7 +20,9 @@ _SPELLED = {"n": "ns", "u": "us", "µ": "us", "mic": "us", "mil": "ms", "ms": "m
 
 
 def require_declared(name: str, rate_hz: float, description: ImportDescription) -> None:
-    """Check the declared rate. Raises `BadParameter` where it is another one."""
+    """Check a measured rate against the declared one. Raises `BadParameter` where it is another one, with a likely
+    reason.
+    """
     declared = description.rate_hz
     if declared is None or abs(rate_hz / declared - 1.0) <= description.rate_tolerance:
         return
@@ -34,7 +36,7 @@ def require_declared(name: str, rate_hz: float, description: ImportDescription) 
 def doubts(
     rate_hz: float, column: ClockColumn, description: ImportDescription, column_name: str, known_s: float
 ) -> list[str]:
-    """Sentences on a rate that was found; `known_s` is by how much the stamps may be off."""
+    """Return sentences of doubt about a rate that was found; `known_s` is by how much the stamps may be off."""
     found: list[str] = []
     declared = description.rate_hz
     if declared is not None:
@@ -56,7 +58,7 @@ def doubts(
 
 
 def clock_error_s(pattern: Pattern, resolution_s: float) -> float:
-    """Largest error of the stamps' places, for all that is known [s]."""
+    """Return the largest error of the stamps' places, as far as known [s]."""
     return resolution_s + (0.0 if pattern.kind in ("steady", "coarse") else pattern.band_s)
 
 

@@ -25,7 +25,7 @@ _UNSORTED = f"; nothing is sorted: give the rows before or after it (rows), or {
 
 @dataclass(frozen=True)
 class ClockFindings:
-    """Findings about a time column that was accepted."""
+    """Findings about a time column that was accepted: rate, repeated rows, gaps, lost samples, warnings."""
 
     rate_hz: float
     """Samples over time, those that are lost counted in."""
@@ -41,9 +41,8 @@ class ClockFindings:
 
 
 def judge(name: str, column: ClockColumn, description: ImportDescription, column_name: str) -> ClockFindings:
-    """Judge the time column of a file.
-
-    Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`, each with a way out.
+    """Return the findings about the time column of a file. Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`
+    where it is refused, each with a way out.
     """
     if column.count < 2:
         raise UnreadableFile(name, "has fewer than two rows: no rate can be found in its time column")

@@ -45,18 +45,22 @@ class Places:
         return int(-self.samples[self.samples < 0].sum())
 
     def before(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Samples that are lost before each of some rows, (k,)."""
+        """Return the number of samples that are lost before each of some rows, (k,)."""
         total = np.concatenate([[0], np.cumsum(self.samples)])
         return total[np.searchsorted(self.rows, rows, side="left")]
 
 
 def ahead_of(span: int) -> int:
-    """Rows to look ahead, a power of two: several batches, so that each window has a row that is on time."""
+    """Return the number of rows to look ahead, a power of two: several batches, so that each window has a row that is
+    on time.
+    """
     return AHEAD if span <= AHEAD // 4 else 1 << int(np.ceil(np.log2(4 * min(span, 1 << 16))))
 
 
 def level(late: Array, ahead: int) -> Array:
-    """The smallest of the next `ahead` values (a power of two), for every row: arrivals are late, never early."""
+    """Return the smallest of the next `ahead` values (a power of two), for every row: arrivals are late, never
+    early.
+    """
     found, reach = late.copy(), 1
     while reach < min(ahead, len(late)):
         found[:-reach] = np.minimum(found[:-reach], found[reach:])
@@ -91,7 +95,7 @@ def changes(
 
 
 def in_order(rows: NDArray[np.int64], samples: NDArray[np.int64], ahead: int) -> Places:
-    """Places in the order of their rows, without rises and falls that make up for one another."""
+    """Return the places in the order of their rows, without rises and falls that make up for one another."""
     order = np.argsort(rows, kind="stable")
     rows, samples = rows[order], samples[order]
     left = samples.copy()

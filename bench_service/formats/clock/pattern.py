@@ -40,7 +40,9 @@ REGULAR = 0.9
 
 @dataclass(frozen=True)
 class Pattern:
-    """Pattern in which the stamps of a recording come."""
+    """Pattern in which the stamps of a recording come: its kind, the period, the band of their errors, the size of
+    batches.
+    """
 
     kind: Literal["steady", "coarse", "batches", "jitter"]
     """The kind of pattern. steady: at the period; coarse: up to the resolution; batches, jitter: as they arrived."""

@@ -35,11 +35,11 @@ class KeptRows:
         self.count = column.count - len(repeats)
 
     def row(self, kept: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Rows of the table, from 0, of rows that are kept."""
+        """Return the rows of the table, from 0, of rows that are kept."""
         return kept + np.searchsorted(self._kept_before, kept, side="right")
 
     def read(self, start: int, stop: int) -> Array:
-        """Stamps [s] of the kept rows start … stop − 1."""
+        """Return the stamps [s] of the kept rows start … stop − 1."""
         stop = min(stop, self.count)
         ends = self.row(np.array([start, stop - 1]))
         begin, end = int(ends[0]), int(ends[1]) + 1
@@ -48,7 +48,7 @@ class KeptRows:
         return np.delete(time_s, inside - begin) if len(inside) else time_s
 
     def sample(self) -> list[Array]:
-        """Stretches of rows from all over the column."""
+        """Return stretches of stamps [s] from all over the column."""
         return [self.read(*window) for window in windows(self.count, WINDOW, SAMPLES)]
 
 
@@ -130,7 +130,7 @@ def _walked(
 
 
 def stretch_of(count: int) -> int:
-    """Number of rows whose mean stamp is one point of the regression: fewer in a short column."""
+    """Return the number of rows whose mean stamp is one point of the regression: fewer in a short column."""
     return STRETCH if count >= 16 * STRETCH else max(1, count // 32)
 
 

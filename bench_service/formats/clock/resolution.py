@@ -33,7 +33,7 @@ def decimal_step(stamps: Array, error: float) -> float:
 
 
 class Resolution:
-    """The resolution while stamps arrive, in their unit: the finest, and a coarser one that comes later."""
+    """Running estimate of a clock's resolution, in the stamps' unit: the finest, and a coarser one that comes later."""
 
     def __init__(self) -> None:
         self.finest = np.inf
@@ -42,7 +42,7 @@ class Resolution:
         self._before = np.inf
 
     def add(self, stamps: Array, error: float) -> None:
-        """More stamps, relative to the first, each off its decimal value by `error` at the most."""
+        """Take in more stamps, relative to the first, each off its decimal value by `error` at the most."""
         self.finest = min(self.finest, decimal_step(stamps, error))
         if len(stamps) < ENOUGH:
             return

@@ -17,7 +17,7 @@ NO_TIME = "leave time_column out and give rate_hz"
 
 @dataclass(frozen=True)
 class Sentences:
-    """Writes the sentences on a time column and its findings."""
+    """Writes the sentences for a person on a time column and its findings."""
 
     column: ClockColumn
     description: ImportDescription
@@ -29,7 +29,7 @@ class Sentences:
 
     @property
     def rows(self) -> NDArray[np.int64]:
-        """The row before each place where the count of samples and that of rows part, from 0."""
+        """Rows, from 0, before each place where the number of samples and that of rows part, (k,)."""
         return self.kept.row(self.mean.places.rows)
 
     @property
@@ -39,27 +39,29 @@ class Sentences:
         return self.rows[positive], self.mean.places.samples[positive]
 
     def repeated(self) -> str:
-        """Describe the rows that were written twice."""
+        """Return the sentence about rows that were written twice."""
         count = len(self.repeats)
         shown = [f"row {self._row(int(r))} ({self._at(int(r))})" for r in self.repeats[:SHOWN_PLACES]]
         verb = "rows repeat" if count > 1 else "row repeats"
         return f"{count} {verb} the row before, time and values: {', '.join(shown)}{_more(count)}"
 
     def lost(self) -> str:
-        """Describe the missing samples and their places."""
+        """Return the sentence about missing samples and their places."""
         rows, samples = self.gaps
         lost = self.mean.places.lost
         verb = "samples are" if lost > 1 else "sample is"
         return f"{lost} {verb} missing in {_places(len(rows))}: {self._placed(rows, samples)}"
 
     def surplus(self) -> str:
-        """Describe the rows for which the time has no room."""
+        """Return the sentence about rows for which the time has no room."""
         negative = self.mean.places.samples < 0
         placed = self._placed(self.rows[negative], -self.mean.places.samples[negative])
         return f"the time has no room for {self.mean.places.surplus} of the rows: {placed}"
 
     def range_without_gaps(self) -> list[str]:
-        """Suggest a range of rows without gap, where all gaps are near the beginning."""
+        """Return a sentence that suggests a range of rows without gap, where all gaps are near the beginning; otherwise
+        nothing.
+        """
         rows, _ = self.gaps
         last = int(rows[-1]) + 1
         if last > 0.05 * self.column.count:
@@ -67,7 +69,7 @@ class Sentences:
         return [f'rows = {{"first": {self._row(last)}}} begins after {"it" if len(rows) == 1 else "them"}']
 
     def done(self) -> list[str]:
-        """Describe rows that were left out, gaps that were marked, wraps that were continued."""
+        """Return sentences about rows that were left out, gaps that were marked, wraps that were continued."""
         found: list[str] = []
         if len(self.repeats):
             found.append(f"{self.repeated()}; they were left out")
@@ -88,7 +90,7 @@ class Sentences:
         return found
 
     def arrival(self, resolution_s: float) -> list[str]:
-        """Describe stamps that are arrival times, or shared by several rows."""
+        """Return a sentence where stamps are arrival times, or shared by several rows; otherwise nothing."""
         rate = f"the rate of {self.mean.rate_hz:.6g} Hz"
         lost = "what is lost is said apart" if self.mean.places.lost else "no sample is lost"
         if self.pattern.batch > 1:
@@ -108,7 +110,7 @@ class Sentences:
         return []
 
     def lost_digits(self, finest_s: float, coarsest_s: float) -> list[str]:
-        """Describe stamps that lose enough digits as they grow for it to matter."""
+        """Return a sentence where stamps lose enough digits as they grow for it to matter; otherwise nothing."""
         if coarsest_s * self.mean.rate_hz < 0.05:
             return []
         return [
@@ -117,7 +119,7 @@ class Sentences:
         ]
 
     def not_uniform(self) -> str:
-        """Describe the stretch whose rate differs most from that of the whole."""
+        """Return the sentence about the stretch whose rate differs most from that of the whole."""
         begin, samples, duration, allowed = self.mean.worst
         row = self._row(int(self.kept.row(np.array([begin]))[0]))
         return (
@@ -142,7 +144,7 @@ class Sentences:
 
 
 def fall(place: Fall, column: ClockColumn, description: ImportDescription) -> str:
-    """Describe a place where the time falls: both stamps with their rows."""
+    """Return the sentence about a place where the time decreases: both stamps with their rows."""
     row = place.row + description.rows.first - 1
     clock = description.time_unit == "clock"
     unit, size = ("s", 1e-9) if clock else (_UNIT[column.scale_s], 1)
@@ -151,7 +153,7 @@ def fall(place: Fall, column: ClockColumn, description: ImportDescription) -> st
 
 
 def others(count: int) -> str:
-    """Mention the number of further falls besides the one that is shown."""
+    """Return the words about the number of further places where the time decreases."""
     return f", and falls in {count} more {'places' if count > 1 else 'place'}" if count else ""
 
 

@@ -6,7 +6,9 @@ from bench_service.formats.errors import UnreadableFile
 
 
 def exactly(stream: BinaryIO, size: int, name: str, wanted: str) -> bytes:
-    """Read `size` bytes. Raises `UnreadableFile` naming the byte where the file is cut off, and what was `wanted`."""
+    """Read and return `size` bytes. Raises `UnreadableFile` naming the byte where the file is cut off, and what was
+    `wanted`.
+    """
     at = stream.tell()
     data = stream.read(size)
     if len(data) < size:

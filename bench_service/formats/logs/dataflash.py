@@ -62,12 +62,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "DataFlash":
-    """Open a log. Raises `UnreadableFile`."""
+    """Return a reader of a DataFlash log. Raises `UnreadableFile`."""
     return DataFlash(stream, name)
 
 
 class DataFlash:
-    """A DataFlash log, read message by message in pieces."""
+    """Reader of one DataFlash log, message by message in pieces. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -177,7 +177,7 @@ class DataFlash:
         self._types[kind] = MessageType(name, size, form, fields if dtype.names else (), dtype)
 
     def tables(self) -> list[LogTable]:
-        """List the message types with samples, each instance apart, and each burst."""
+        """Return the message types with samples as tables, each instance apart, and each burst."""
         found: list[LogTable] = []
         by_name = {t.name: t for t in self._types.values()}
         for (name, instance), rows in self._counts.items():
@@ -189,7 +189,9 @@ class DataFlash:
         return found + [burst_table(burst) for burst in self._bursts]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield rows of one instance, or the samples of one burst. Raises `UnreadableFile`."""
+        """Yield blocks of rows of one instance, or of one burst: for each named column its values, (n,). Raises
+        `UnreadableFile`.
+        """
         burst = next((b for b in self._bursts if b.title == table.name), None)
         if burst is not None:
             batches = (rows for _, rows in self._gathered("ISBD"))

@@ -31,7 +31,7 @@ SAMPLES = 32
 
 
 def message_table(name: str, instance: int, fields: Sequence[str], form: str, rows: int) -> LogTable | None:
-    """Build the table of a message type; None: it has no time, so no samples."""
+    """Return the table of a message type; None: it has no time, so no samples."""
     clocks = tuple(LogClock(field, 1e-6, words) for field, words in _CLOCKS if field in fields)
     if not clocks:
         return None
@@ -65,7 +65,7 @@ class Burst:
 
     @classmethod
     def of(cls, row: Any) -> "Burst":
-        """Read a burst out of its header."""
+        """Return the burst that a header record describes."""
         names = row.dtype.names
         kind = int(row["type"])
         return cls(
@@ -80,12 +80,12 @@ class Burst:
 
     @property
     def title(self) -> str:
-        """Return the name of its table."""
+        """Name of the burst's table, with its number and instance."""
         return f"burst {self.number} of {self.kind}[{self.instance}]"
 
 
 def burst_table(burst: Burst) -> LogTable:
-    """Build the table of a burst: its own recording, since there are gaps between bursts."""
+    """Return the table of a burst: its own recording, since there are gaps between bursts."""
     gyro = burst.kind == "gyro"
     quantity, unit = (Quantity.ANGULAR_RATE, "rad/s") if gyro else (Quantity.SPECIFIC_FORCE, "m/s^2")
     scale = 1.0 / burst.multiplier if burst.multiplier else 1.0
@@ -99,7 +99,9 @@ def burst_table(burst: Burst) -> LogTable:
 
 
 def burst_rows(burst: Burst, batches: Iterable[Any], columns: Sequence[str], name: str) -> Iterator[list[Numbers]]:
-    """Yield the samples of a burst. Raises `UnreadableFile` where a part of it is missing."""
+    """Yield blocks of the samples of a burst: for each named column its values, (n,). Raises `UnreadableFile` where a
+    part of it is missing.
+    """
     done = 0
     for rows in batches:
         part = rows[rows["N"] == burst.number]

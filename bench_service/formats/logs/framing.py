@@ -14,7 +14,7 @@ _REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
 class Framing(Protocol):
-    """Rules of one protocol."""
+    """Rules by which one protocol's frames are found: where one may begin, its length, its checksum. Interface."""
 
     def next(self, data: bytes, at: int) -> int:
         """Return the place of the next byte at which a frame may begin, from `at` on; −1: there is none."""
@@ -31,7 +31,7 @@ class Framing(Protocol):
 
 @dataclass
 class Counted:
-    """Counts of one pass over a file."""
+    """Counts of one pass over a file: frames, wrong checksums, skipped bytes, with their first places."""
 
     frames: int = 0
     bad: int = 0
@@ -43,7 +43,7 @@ class Counted:
     places: int = 0
 
     def warnings(self, what: str) -> list[str]:
-        """Describe what was left out."""
+        """Return sentences about the frames and bytes that were left out; empty where none were."""
         found: list[str] = []
         if self.bad:
             share = f"{self.bad} of {self.bad + self.frames}"
@@ -139,7 +139,7 @@ def require_frames(counted: Counted, name: str, what: str, hint: str) -> None:
 
 
 def crc32_mpeg2(data: bytes) -> int:
-    """CRC-32 of polynomial 0x04C11DB7, start 0xFFFFFFFF, not reflected, nothing at the end.
+    """Return the CRC-32 of polynomial 0x04C11DB7, start 0xFFFFFFFF, not reflected, nothing at the end.
 
     It is the reflected CRC of zlib over bytes with their bits reversed, itself reversed.
     """

@@ -50,12 +50,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Hg4930":
-    """Open a dump. Raises `UnreadableFile`."""
+    """Return a reader of an HG4930 dump. Raises `UnreadableFile`."""
     return Hg4930(stream, name)
 
 
 class Hg4930:
-    """A dump of messages."""
+    """Reader of one dump of HG4930 messages. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -87,7 +87,7 @@ class Hg4930:
             )
 
     def tables(self) -> list[LogTable]:
-        """List the inertial messages, and all messages with their instantaneous rates."""
+        """Return two tables: the inertial messages, and all messages with their instantaneous rates."""
         found: list[LogTable] = []
         note = "messages have no time: the rate is the manual's, and a lost message is seen by the counter alone"
         if self._counts[2]:
@@ -117,7 +117,7 @@ class Hg4930:
         return found
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield values of the inertial messages, or of all."""
+        """Yield blocks of the inertial messages, or of all: for each named column its values, (n,)."""
         inertial = table.name == "inertial"
         dtype = _INERTIAL if inertial else _BOTH
         for found in frames(self._stream, _Messages(), Counted()):

@@ -35,12 +35,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Imr":
-    """Open an IMR file. Raises `UnreadableFile`."""
+    """Return a reader of an IMR file. Raises `UnreadableFile`."""
     return Imr(stream, name)
 
 
 class Imr:
-    """Reader of an IMR file."""
+    """Reader of one Waypoint IMR file. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -88,7 +88,7 @@ class Imr:
             )
 
     def tables(self) -> list[LogTable]:
-        """Describe the records as one table."""
+        """Return the records as one table. Raises `UnreadableFile` where the file has none."""
         if not self._rows:
             raise UnreadableFile(self._name, "has a header and no records")
         gyro, acc, asks = self._gyro, self._acc, list[str]()
@@ -114,7 +114,7 @@ class Imr:
         return [LogTable("records", columns, (clock,), self._rate_hz, self._rows, tuple(notes), tuple(asks))]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the records' values."""
+        """Yield blocks of records: for each named column its values, (n,)."""
         for start in range(0, self._rows, BLOCK_ROWS):
             count = min(BLOCK_ROWS, self._rows - start)
             self._stream.seek(HEADER_BYTES + start * self._dtype.itemsize)

@@ -63,12 +63,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "IxcomLog":
-    """Open a dump. Raises `UnreadableFile`."""
+    """Return a reader of an iXCOM dump. Raises `UnreadableFile`."""
     return IxcomLog(stream, name)
 
 
 class IxcomLog:
-    """A dump of messages."""
+    """Reader of one dump of iXCOM messages. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -88,7 +88,7 @@ class IxcomLog:
             self.warnings.append(f"{others} messages are of other kinds than {', '.join(MESSAGES.values())}")
 
     def tables(self) -> list[LogTable]:
-        """List the kinds of messages."""
+        """Return the kinds of inertial messages as tables."""
         return [self._table(MESSAGES[kind], rows) for kind, rows in sorted(self._rows.items())]
 
     def _table(self, title: str, rows: int) -> LogTable:
@@ -99,7 +99,7 @@ class IxcomLog:
         return LogTable(title, columns, (clock,), None, rows, (f"values are {_NOTES[title]}",))
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield samples of one kind of message."""
+        """Yield blocks of one kind of message: for each named column its values, (n,)."""
         kind = next(k for k, title in MESSAGES.items() if title == table.name)
         for found in frames(self._stream, _Messages(), Counted()):
             part = b"".join(m for _, m in found if m[1] == kind and len(m) == _IMU.itemsize)

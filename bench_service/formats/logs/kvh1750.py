@@ -63,12 +63,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Kvh1750":
-    """Open a dump. Raises `UnreadableFile`."""
+    """Return a reader of a KVH 1750 dump. Raises `UnreadableFile`."""
     return Kvh1750(stream, name)
 
 
 class Kvh1750:
-    """A dump of frames."""
+    """Reader of one dump of KVH 1750 frames. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -97,7 +97,7 @@ class Kvh1750:
             self.warnings.append(f"{invalid} frames mark a gyro or an accelerometer as not valid")
 
     def tables(self) -> list[LogTable]:
-        """List the one kind of frames."""
+        """Return the frames, all of one kind, as one table."""
         columns = (
             *triad([f"rotation_{a}" for a in "xyz"], "gyro", Quantity.ANGULAR_RATE, "rad/s", source=_SOURCE),
             *triad([f"acceleration_{a}" for a in "xyz"], "accelerometer", Quantity.SPECIFIC_FORCE, "g", source=_SOURCE),
@@ -108,7 +108,7 @@ class Kvh1750:
         return [LogTable("format A", columns, (), None, self._count, (), _ASKS)]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield blocks of frames: the arrays of the named columns, in their order."""
+        """Yield blocks of frames: for each named column its values, (n,)."""
         for found in frames(self._stream, _Frames(), Counted()):
             data = np.frombuffer(b"".join(frame for _, frame in found), _FRAME)
             yield [_column(data, name) for name in columns]

@@ -15,15 +15,19 @@ _UNIT_IN_NAME = re.compile(r"[\[(\]{]\s*([^\[\](){}]+?)\s*[\])}]\s*$")
 _INDEX = re.compile(r"[\[(]?([0-2])[\])]?$")
 _RATE_WORDS = r"gyro|gyr|gyroscope|angular_?(?:rate|velocity|vel)|ang_?vel|omega|omg|w_rs_s|rotation_?rate|rot_?rate"
 _FORCE_WORDS = (
-    r"accelerometer|accelero|acceleration|accel|acc|specific_?force|a_rs_s|linear_?acceleration|lin_?acc|sf|gforce|gf"
+    r"accelerometer|accelero|acceleration|accel|acce|acc|specific_?force|a_rs_s|linear_?acceleration|lin_?acc|sf|gforce"
+    r"|gf"
 )
 _GYRO = re.compile(rf"(?:^|[^a-z])(?:raw|uncomp|comp|imu)?_?(?:{_RATE_WORDS})(?:[^a-z]|[xyz](?:$|[^a-z])|$)")
 _FORCE = re.compile(rf"(?:^|[^a-z])(?:raw|uncomp|comp|imu)?_?(?:{_FORCE_WORDS})(?:[^a-z]|[xyz](?:$|[^a-z])|$)")
 _SHORT_RATE = re.compile(r"^(?:w|g|p_?q_?r|omega)_?([xyz])$")
-_SHORT_FORCE = re.compile(r"^(?:a|f|gf)_?([xyz])$")
-_ANGLE_STEP = re.compile(r"delta_?(?:theta|angle|q\b)|dtheta|dang|angle_?increment|d_?ang(?:le)?")
+_SHORT_FORCE = re.compile(r"^(?:a|f|g_?f)_?([xyz])$")
+_BODY_RATE = re.compile(r"(?:^|_)w_?b(?:$|[\[(_])")
+_BODY_FORCE = re.compile(r"(?:^|_)f_?b(?:$|[\[(_])")
+"""Names of NaveGo and of textbooks for rates and forces in the body's frame, wb and fb."""
+_ANGLE_STEP = re.compile(r"delta_?(?:theta|angle|q\b)|dtheta|angle_?increment|(?:^|_)d_?ang(?:le)?(?:_|[xyz]|[\[(]|$)")
 _VELOCITY_STEP = re.compile(
-    r"delta_?(?:v|vel|velocity)(?:[^a-z]|[xyz]|$)|dvel|(?:^|_)dv(?:[^a-z]|[xyz]|$)|velocity_?increment"
+    r"delta_?(?:v|vel|velocity)(?:[^a-z]|[xyz]|$)|dvel|(?:^|_)dv(?:[^a-z]|[xyz]|$)|velocity_?increment|vel_?inc(?:_|$)"
 )
 _TEMPERATURE = re.compile(r"(?:^|[^a-z])temp(?:erature)?(?:[^a-z]|$|\d)")
 _AXIS = re.compile(r"(?:^|[^a-z])([xyz])(?:$|[^a-z])|([xyz])$")
@@ -34,10 +38,19 @@ _PROCESSED = (
         re.compile(r"linear_?accel(?:eration)?_?[xyz]?_?(?:\(|$|\[)"),
         "of a phone, linear acceleration is without gravity",
     ),
-    (re.compile(r"(?:^|[^a-z])(?:mag|magn|magnetometer|gravity|quat|euler|orientation|covariance|cov|bias|std)"), ""),
+    (re.compile(r"(?:^|[^a-z])lin_?acce?(?:[^a-z]|$)"), "linear acceleration is without gravity"),
+    (
+        re.compile(
+            r"(?:^|[^a-z])(?:mag|magn|magnetometer|gravity|grav|quat|euler|orientation|covariance|cov|bias|std)"
+        ),
+        "",
+    ),
 )
 _TIME = re.compile(
     r"^(?:#?\s*)(?:time|timestamp|t|stamp|sec|seconds|tow|gps_?time|time_?s|elapsed|uptime)(?:[^a-z]|$)|sample_?time_?fine|seconds_elapsed|timestartup|time_?gps|_time$|timestamp"
+)
+_COUNTER = re.compile(
+    r"count|^(?:index|idx|row|seq|sequence|sample|samples|packet|id|no|nr|n|i|k)$|(?:sample|packet|row)_?(?:no|nr|num|index)"
 )
 _TIME_UNITS = (
     (re.compile(r"(?:\bns\b|nano|_ns$|\[ns\])"), "ns"),
@@ -61,7 +74,10 @@ _SPELLED = {
     "m/s**2": "m/s^2",
     "m/s2": "m/s^2",
     "mps2": "m/s^2",
+    "g": "g",
     "g-force": "g",
+    "degrees per second": "deg/s",
+    "meters/second^2": "m/s^2",
     "degc": "degC",
     "deg c": "degC",
     "celsius": "degC",
@@ -92,7 +108,7 @@ def unit_of(text: str, quantity: Quantity | Accumulated | None) -> str | None:
 
 
 def hint(name: str) -> Hint:
-    """Guess the meaning of a column from its name, or from the last part of its path."""
+    """Return the likely meaning of a column by its name, or by the last part of its path."""
     found = _hint(name)
     last = _last(name)
     return found if found.quantity is not None or found.doubt or last == name else _hint(last)
@@ -108,14 +124,15 @@ def _hint(name: str) -> Hint:
     if doubt == "":
         return Hint()
     axis = _axis(lower)
+    short = _plain(_UNIT_IN_NAME.sub(lambda m: m[0] if m[1].isdecimal() else "", name)).rstrip("_")
     found: tuple[Quantity, str] | None = None
     if _ANGLE_STEP.search(lower):
         found = Quantity.ANGLE_INCREMENT, "gyro"
     elif _VELOCITY_STEP.search(lower):
         found = Quantity.VELOCITY_INCREMENT, "accelerometer"
-    elif _GYRO.search(lower) or _SHORT_RATE.match(lower):
+    elif _GYRO.search(lower) or _SHORT_RATE.match(short) or _BODY_RATE.search(lower):
         found = Quantity.ANGULAR_RATE, "gyro"
-    elif _FORCE.search(lower) or _SHORT_FORCE.match(lower):
+    elif _FORCE.search(lower) or _SHORT_FORCE.match(short) or _BODY_FORCE.search(lower):
         found = Quantity.SPECIFIC_FORCE, "accelerometer"
     if found is not None and axis:
         quantity, kind = found
@@ -123,6 +140,11 @@ def _hint(name: str) -> Hint:
     if _TEMPERATURE.search(lower) and found is None:
         return Hint(Quantity.TEMPERATURE, "temperature", _named_unit(name, Quantity.TEMPERATURE))
     return Hint()
+
+
+def is_counter(name: str) -> bool:
+    """Return whether a name is that of a count of samples or packets, which is no time."""
+    return _COUNTER.search(_plain(name)) is not None
 
 
 def is_time(name: str) -> bool:

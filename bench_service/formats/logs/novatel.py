@@ -56,7 +56,7 @@ class _Logs:
 
 
 def crc(data: bytes) -> int:
-    """NovAtel's CRC-32: reflected, start 0, nothing at the end."""
+    """Return NovAtel's CRC-32: reflected, start 0, nothing at the end."""
     return crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
@@ -68,12 +68,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "NovAtel":
-    """Open a file of logs. Raises `UnreadableFile`."""
+    """Return a reader of a file of NovAtel logs. Raises `UnreadableFile`."""
     return NovAtel(stream, name)
 
 
 class NovAtel:
-    """A file of logs."""
+    """Reader of one file of NovAtel logs, ASCII and binary. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -108,11 +108,11 @@ class NovAtel:
                 self._tables[key] = message_table(key, count, known, encrypted)
 
     def tables(self) -> list[LogTable]:
-        """List the kinds of logs with inertial data."""
+        """Return the kinds of logs with inertial data as tables."""
         return list(self._tables.values())
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the values of one kind of log. Raises `UnreadableFile`."""
+        """Yield blocks of one kind of log: for each named column its values, (n,). Raises `UnreadableFile`."""
         rows = {table.name: Rows(table.name, self._name)}
         for found in frames(self._stream, _Logs(), Counted()):
             for key, data in _by_kind(found, rows):

@@ -58,7 +58,7 @@ _GRAVITY = (
 
 
 class Rows:
-    """Gathers the logs of one kind as records."""
+    """Gathers the logs of one kind as an array of records, until they are taken."""
 
     def __init__(self, key: str, name: str) -> None:
         self._key, self._name = key, name
@@ -69,7 +69,7 @@ class Rows:
         self._parts: list[Any] = []
 
     def add_binary(self, stamp: bytes, body: bytes, at: int) -> None:
-        """Take a log's time (week, ms) and body in. Raises `UnreadableFile` for a body of another length."""
+        """Add a binary log, by its time (week, ms) and body. Raises `UnreadableFile` for a body of another length."""
         if len(body) != self._body.itemsize:
             raise UnreadableFile(
                 self._name,
@@ -81,7 +81,7 @@ class Rows:
         self._binary.append(stamp + body)
 
     def add_text(self, line: bytes, at: int) -> None:
-        """Take an ASCII log in. Raises `UnreadableFile` for one with other fields."""
+        """Add an ASCII log. Raises `UnreadableFile` for one with other fields."""
         if self._binary:
             self._close_binary()
         head, _, rest = line.decode("ascii", "replace").partition(";")
@@ -110,7 +110,7 @@ class Rows:
         self._text = []
 
     def taken(self) -> Any:
-        """Return all records that were gathered, and begin again."""
+        """Return all records that were gathered, and forget them."""
         if self._binary:
             self._close_binary()
         if self._text:
@@ -128,7 +128,7 @@ class Rows:
 
 
 def message_table(key: str, rows: int, types: Collection[int], encrypted: int) -> LogTable:
-    """Build the table of one kind of log. `types`: types of unit that the file names."""
+    """Return the table of one kind of log. `types`: types of unit that the file names."""
     head = LogClock(HEAD_TIME, 1e-9, "GPS time in the log's header, whole milliseconds")
     if "week" not in {name for name, _ in _RECORDS[key]}:
         return _corrected(key, rows, (head,))

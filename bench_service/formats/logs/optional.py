@@ -7,7 +7,9 @@ from bench_service.formats.errors import UnreadableFile
 
 
 def needed(module: str, file: str) -> Any:
-    """Import a module of an optional package. Raises `UnreadableFile` with the way out where it is not installed."""
+    """Import and return a module of an optional package. Raises `UnreadableFile` with the way out where it is not
+    installed.
+    """
     try:
         return importlib.import_module(module)
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""The formats of log files, and which of them a file is of."""
+"""Registry of the formats of log files, and the choice of a file's format."""
 
 from types import ModuleType
 from typing import BinaryIO, cast
@@ -37,7 +37,8 @@ FORMATS = {form.NAME: form for form in (*BY_SIGNATURE, *BY_FRAMES)}
 
 
 def format_of(stream: BinaryIO, wanted: str | None = None) -> LogFormat | None:
-    """Find the format of a file, or take the one that is asked for; None: it is a table of text or of columns.
+    """Return the format of a file by its beginning, or the one that is wanted; None: it is a table of text or of
+    columns.
 
     Raises `BadParameter` for a format that is not known.
     """
@@ -53,6 +54,6 @@ def format_of(stream: BinaryIO, wanted: str | None = None) -> LogFormat | None:
 
 
 def opened_log(stream: BinaryIO, name: str, wanted: str | None = None) -> Log | None:
-    """Open a file as a log; None: it is a table. Raises `UnreadableFile`, `BadParameter`."""
+    """Return a reader of a file as a log; None: it is a table. Raises `UnreadableFile`, `BadParameter`."""
     form = format_of(stream, wanted)
     return None if form is None else form.opened(stream, name)

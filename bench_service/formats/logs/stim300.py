@@ -99,12 +99,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Stim300":
-    """Open a dump. Raises `UnreadableFile`."""
+    """Return a reader of a STIM300 dump. Raises `UnreadableFile`."""
     return Stim300(stream, name)
 
 
 class Stim300:
-    """A dump of datagrams."""
+    """Reader of one dump of STIM300 datagrams. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -124,7 +124,7 @@ class Stim300:
             self.warnings.append(f"{flagged} datagrams have a status of the gyros that is not 0, first at byte {first}")
 
     def tables(self) -> list[LogTable]:
-        """List the kinds of datagrams."""
+        """Return the kinds of datagrams as tables."""
         return [self._table(identifier, rows) for identifier, rows in self._rows.items()]
 
     def _table(self, identifier: int, rows: int) -> LogTable:
@@ -153,7 +153,7 @@ class Stim300:
         return LogTable(f"datagram 0x{identifier:02X}", columns, (clock,), None, rows, (), asks)
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield samples of one kind of datagram."""
+        """Yield blocks of one kind of datagram: for each named column its values, (n,)."""
         identifier = int(table.name.rpartition("0x")[2], 16)
         groups = self._framing.groups[identifier]
         size = size_of_datagram(groups)
@@ -184,7 +184,7 @@ def _column(data: Any, groups: Sequence[str], name: str) -> Numbers:
 
 
 def big_endian(data: Any) -> Numbers:
-    """Convert signed big-endian integers of 2 or 3 bytes, (n, 2 or 3), to int64."""
+    """Return signed big-endian integers of 2 or 3 bytes, (n, 2 or 3), as int64, (n,)."""
     value = data[:, 0].astype(np.int8).astype(np.int64)
     for place in range(1, data.shape[1]):
         value = value << 8 | data[:, place]

@@ -1,4 +1,4 @@
-"""The one shape of every reader: tables with columns, clocks and doubts, and their rows in blocks."""
+"""The interface of every reader of logs: tables with columns, clocks and doubts, and their rows in blocks."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class LogColumn:
 
 @dataclass(frozen=True)
 class LogClock:
-    """A column that holds time."""
+    """A column of a log that holds time, with its unit and the meaning of the time."""
 
     column: str
     unit_s: float | None
@@ -80,12 +80,14 @@ class LogTable:
 
 
 class Log(Protocol):
-    """An opened file of one format. `warnings` grows while rows are read: bad checksums, parts that were left out."""
+    """An opened file of one format. `warnings` grows while rows are read: bad checksums, parts that were left out.
+    Interface.
+    """
 
     warnings: list[str]
 
     def tables(self) -> Sequence[LogTable]:
-        """List the tables. Raises `UnreadableFile`."""
+        """Return the tables of the file. Raises `UnreadableFile`."""
         ...
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
@@ -94,7 +96,9 @@ class Log(Protocol):
 
 
 class LogFormat(Protocol):
-    """Module of a format: its name, its signature and its reader."""
+    """Module of a format of log files: its name, its signature and its reader. Interface of the modules in
+    `formats/logs`.
+    """
 
     NAME: str
     TITLE: str
@@ -104,12 +108,12 @@ class LogFormat(Protocol):
         ...
 
     def opened(self, stream: BinaryIO, name: str) -> Log:
-        """Open a file of this format. Raises `UnreadableFile`."""
+        """Return a reader of a file of this format. Raises `UnreadableFile`."""
         ...
 
 
 def find_table(log: Log, name: str, wanted: str | None, columns: Sequence[str]) -> LogTable:
-    """Find the table that is asked for, or the only one that has all the columns. Raises `UnreadableFile`."""
+    """Return the table that is asked for, or the only one that has all the columns. Raises `UnreadableFile`."""
     tables = log.tables()
     if wanted is not None:
         found = [t for t in tables if t.name == wanted]
@@ -130,7 +134,7 @@ def _names(tables: Sequence[LogTable]) -> str:
 
 
 def as_numbers(values: Numbers) -> Numbers:
-    """Convert a column to float64, or to int64 where it holds integers that fit."""
+    """Return a column as float64, or as int64 where it holds integers that fit."""
     if values.dtype == np.int64 or values.dtype == np.float64:
         return values
     if values.dtype.kind in "iu" and values.dtype.itemsize < 8:
@@ -143,7 +147,7 @@ def as_numbers(values: Numbers) -> Numbers:
 def triad(
     names: Sequence[str], kind: str, quantity: Quantity, unit: str | None, scale: float = 1.0, source: str = ""
 ) -> tuple[LogColumn, ...]:
-    """Build the columns of three axes x, y, z; `kind`: gyro or accelerometer."""
+    """Return the columns of three axes x, y, z; `kind`: gyro or accelerometer."""
     return tuple(
         LogColumn(name, quantity, unit, scale, 0.0, f"{kind}_{axis}", source)
         for name, axis in zip(names, "xyz", strict=True)

@@ -44,12 +44,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "ULog":
-    """Open a ULog. Raises `UnreadableFile`."""
+    """Return a reader of a ULog. Raises `UnreadableFile`."""
     return ULog(stream, name)
 
 
 class ULog:
-    """A ULog, read message by message in pieces."""
+    """Reader of one ULog, message by message in pieces. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -182,7 +182,7 @@ class ULog:
         return max((shift + (np.dtype(code).itemsize if code else 1) for _, code, shift in layout), default=0)
 
     def tables(self) -> list[LogTable]:
-        """List the topics that have rows, each instance apart."""
+        """Return the topics that have rows as tables, each instance apart."""
         found: list[LogTable] = []
         for key, (topic, instance) in self._topics.items():
             if self._counts.get(key):
@@ -192,7 +192,7 @@ class ULog:
         return found
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the rows of a topic in blocks. Raises `UnreadableFile`."""
+        """Yield blocks of a topic's rows: for each named column its values, (n,). Raises `UnreadableFile`."""
         topic, _, rest = table.name.rpartition("[")
         instance = int(rest[:-1])
         keys = [key for key, known in self._topics.items() if known == (topic, instance)]

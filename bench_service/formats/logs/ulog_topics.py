@@ -35,7 +35,7 @@ def is_fifo(names: Iterable[str]) -> bool:
 
 
 def topic_table(title: str, topic: str, names: Sequence[str], types: Mapping[str, str], rows: int) -> LogTable:
-    """Build the table of a topic. `types`: numpy's code of each field."""
+    """Return the table of a topic. `types`: numpy's code of each field."""
     if is_fifo(names):
         return _fifo_table(title, topic, sum(n.startswith("x[") for n in names))
     clocks = tuple(LogClock(field, 1e-6, words) for field, words in _CLOCKS if field in names)
@@ -91,7 +91,9 @@ def _fifo_table(title: str, topic: str, most: int) -> LogTable:
 
 
 def unrolled(rows: Any, columns: Sequence[str]) -> list[Numbers]:
-    """Unroll batches of a FIFO: the samples of each row in order, in physical units, with their own times [µs]."""
+    """Return batches of a FIFO unrolled: the samples of each row in order, in physical units, with their own times
+    [µs].
+    """
     most = sum(name.startswith("x[") for name in rows.dtype.names)
     count = np.minimum(rows["samples"].astype(np.int64), most)
     taken = np.arange(most) < count[:, None]

@@ -84,12 +84,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "VectorNav":
-    """Open a capture. Raises `UnreadableFile`."""
+    """Return a reader of a VectorNav capture. Raises `UnreadableFile`."""
     return VectorNav(stream, name)
 
 
 class VectorNav:
-    """A capture of ASCII messages."""
+    """Reader of one capture of VectorNav's ASCII messages. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream = stream
@@ -105,7 +105,7 @@ class VectorNav:
         self.warnings += counted.warnings("messages")
 
     def tables(self) -> list[LogTable]:
-        """List the kinds of messages."""
+        """Return the kinds of messages as tables."""
         columns = triad([f"gyro_{a}" for a in "xyz"], "gyro", Quantity.ANGULAR_RATE, "rad/s", source=_SOURCE) + triad(
             [f"acc_{a}" for a in "xyz"], "accelerometer", Quantity.SPECIFIC_FORCE, "m/s^2", source=_SOURCE
         )
@@ -116,7 +116,7 @@ class VectorNav:
         ]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the values of one kind of message."""
+        """Yield blocks of one kind of message: for each named column its values, (n,)."""
         places = [_FIELDS[table.name].index(name) for name in columns]
         start = f"${table.name}".encode()
         for found in frames(self._stream, _Messages(), Counted()):

@@ -11,7 +11,7 @@ class UnreadablePdf(Exception):
 
 
 def attached_files(data: bytes) -> Mapping[str, bytes]:
-    """Files inside a PDF by name. Raises `UnreadablePdf`."""
+    """Return the files inside a PDF by name. Raises `UnreadablePdf`."""
     from pypdf import PdfReader
     from pypdf.errors import PyPdfError
 

@@ -7,14 +7,16 @@ LEAST_DIGITS = 6
 
 
 def places(uncertainty: float | None) -> int | None:
-    """Decimal places of the second significant digit of an uncertainty; None where there is none to follow."""
+    """Return the number of decimals of the second significant digit of an uncertainty; None where there is none to
+    follow.
+    """
     if uncertainty is None or not isfinite(uncertainty) or uncertainty <= 0.0:
         return None
     return 1 - floor(log10(uncertainty))
 
 
 def to_uncertainty(value: float, uncertainty: float | None) -> str:
-    """Format a value to the second significant digit of its uncertainty; without one, with six digits."""
+    """Return a value as text to the second significant digit of its uncertainty; without one, with six digits."""
     after_point = places(uncertainty)
     if after_point is None or not isfinite(value):
         return f"{value:.{LEAST_DIGITS}g}"
@@ -25,7 +27,7 @@ def to_uncertainty(value: float, uncertainty: float | None) -> str:
 
 
 def two_digits(uncertainty: float) -> str:
-    """Format an uncertainty with two significant digits; one that is zero or not finite as it is."""
+    """Return an uncertainty as text with two significant digits; one that is zero or not finite as it is."""
     after_point = places(uncertainty)
     if after_point is None:
         return f"{uncertainty:.{LEAST_DIGITS}g}"

@@ -13,21 +13,21 @@ MOST_ROWS = 300
 
 @dataclass(frozen=True)
 class Heading:
-    """Heading of a part of the report."""
+    """Block of a report: the heading of a part."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Rows of a name and its text."""
+    """Block of a report: rows of a name and its text."""
 
     rows: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Text of its own; `warning` sets it off."""
+    """Block of a report: a text of its own; `warning` sets it off."""
 
     text: str
     warning: bool = False
@@ -35,7 +35,9 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class PrintedTable:
-    """Table whose cells are text already; `numeric` lists the columns that are set to the right."""
+    """Block of a report: a table whose cells are text already; `numeric` lists the columns that are set to the
+    right.
+    """
 
     title: str
     columns: tuple[str, ...]
@@ -75,7 +77,7 @@ class PrintedDocument:
 
 
 def printed_table(table: Table) -> PrintedTable:
-    """A table of a result's report as text; of a long one the first rows, and the note says so."""
+    """Return a table of a result's report as text; of a long one the first rows, and the note says so."""
     rows = tuple(tuple(_cell(cell) for cell in row) for row in table.rows[:MOST_ROWS])
     left = len(table.rows) - len(rows)
     more = f" {left} more rows are in the attached document." if left > 0 else ""
@@ -83,7 +85,7 @@ def printed_table(table: Table) -> PrintedTable:
 
 
 def blocks_of(report: Report) -> tuple[Block, ...]:
-    """Tables and figures of a result's report, in its order."""
+    """Return the tables and figures of a result's report, in its order."""
     return tuple(printed_table(one) if isinstance(one, Table) else one for one in report.sections)
 
 

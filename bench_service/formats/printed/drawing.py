@@ -28,7 +28,7 @@ _DRAWING = Lock()
 
 
 def drawn_here(figure: Figure) -> str:
-    """Draw the figure as an SVG document in this process."""
+    """Return a figure as an SVG document, drawn by matplotlib in this process; one at a time."""
     with _DRAWING:
         return _drawn(figure)
 

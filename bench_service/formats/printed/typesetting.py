@@ -44,7 +44,9 @@ LONG = 40
 
 
 def typeset(document: PrintedDocument) -> bytes:
-    """The document as a PDF/A-3b file; equal documents give equal bytes."""
+    """Return the document as a PDF/A-3b file; equal documents give equal bytes. Takes about a second; writes temporary
+    files.
+    """
     import typst  # 80 MB that only a process that prints loads
 
     with _folder(document) as folder:
@@ -74,7 +76,9 @@ def _drawable() -> frozenset[int]:
 
 
 def printable(text: str) -> str:
-    """Text with each character that the font lacks, or that a PDF/A may not hold, written as its code point."""
+    """Return a text with each character that the font lacks, or that a PDF/A may not hold, written as its code
+    point.
+    """
     return "".join(c if c == "\n" or _fits(c) else "" if _silent(c) else f"[U+{ord(c):04X}]" for c in text)
 
 

@@ -1,7 +1,8 @@
-"""The table and the columns that a description is proposed of."""
+"""Choice of the table and the columns for a proposed description."""
 
 from collections.abc import Sequence
 
+from bench_service.formats.bounds import listed, quoted
 from bench_service.formats.logs.table import LogColumn, LogTable
 from procedures.core.recording import ACCELEROMETER, GYRO
 
@@ -10,16 +11,30 @@ MOST_CHANNELS = 16
 
 
 def chosen_table(tables: Sequence[LogTable]) -> LogTable:
-    """Choose the table with the most axes; of equal ones that with a clock, of higher rank, the longest."""
-    return max(tables, key=lambda t: (_axes(t), bool(t.clocks), t.rank, t.rows or 0))
+    """Return the table with the most axes; of equal ones by doubts, clock, rank, length."""
+    return max(tables, key=lambda t: (_axes(t), -_doubts(t), bool(t.clocks), t.rank, t.rows or 0))
+
+
+def other_tables(chosen: LogTable, tables: Sequence[LogTable]) -> list[str]:
+    """Say which other tables hold a triad: another unit's, another instance's, or that which the chosen one lacks."""
+    others = [t.name for t in tables if t.name != chosen.name and _axes(t) >= len(GYRO)]
+    if not others:
+        return []
+    return [f"this is table {quoted(chosen.name)}; gyros or accelerometers are also in {listed(others)}: give table"]
 
 
 def _axes(table: LogTable) -> int:
     return len({column.channel for column in table.columns} & set(ORDER))
 
 
+def _doubts(table: LogTable) -> int:
+    return len({column.channel for column in table.columns if column.doubt} & set(ORDER))
+
+
 def chosen_columns(table: LogTable) -> tuple[list[LogColumn], list[str]]:
-    """Choose one column for each channel, gyros before accelerometers before the rest; sentences on those left out."""
+    """Return one column for each channel, gyros before accelerometers before the rest; and sentences on those
+    left out.
+    """
     first: dict[str, LogColumn] = {}
     others: list[str] = []
     for column in table.columns:
@@ -56,7 +71,7 @@ def _require_one_quantity(first: dict[str, LogColumn], kind: Sequence[str]) -> N
 
 
 def missing_axes(columns: Sequence[LogColumn]) -> list[str]:
-    """List the axes of a triad of which some are there and others not."""
+    """Return the names of missing axes of triads of which some axes are there."""
     have = {column.channel for column in columns}
     found: list[str] = []
     for kind in (GYRO, ACCELEROMETER):

@@ -1,4 +1,4 @@
-"""Rows held against a proposal: the clocks by the one inspection of time stamps, and plain statistics."""
+"""Inspection of a file's rows for a proposal: the clocks, as an import inspects them, and plain statistics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -24,13 +24,15 @@ LENIENT: dict[str, Any] = {"gaps": "mark", "repeats": "drop", "unwrap_clock": Tr
 
 @dataclass
 class Values:
-    """Sums over all rows of some channels, raw values. `rows`: how many there are."""
+    """Running sums over all rows of some channels, raw values. `rows`: how many there are."""
 
     rows: int = 0
     sums: Array = field(default_factory=lambda: np.zeros(0))
     squares: Array = field(default_factory=lambda: np.zeros(0))
     finite: Array = field(default_factory=lambda: np.zeros(0))
     largest: Array = field(default_factory=lambda: np.zeros(0))
+    whole: Array = field(default_factory=lambda: np.zeros(0))
+    """1 where all finite values of a channel are whole numbers."""
     shift: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, block: Array) -> None:
@@ -39,12 +41,14 @@ class Values:
             width = block.shape[1]
             self.shift = np.where(np.isfinite(block[0]), block[0], 0.0)
             self.sums, self.squares, self.finite, self.largest = (np.zeros(width) for _ in range(4))
+            self.whole = np.ones(width)
         good = np.isfinite(block)
         moved = np.where(good, block - self.shift, 0.0)
         self.sums += moved.sum(axis=0)
         self.squares += (moved**2).sum(axis=0)
         self.finite += good.sum(axis=0)
         self.largest = np.maximum(self.largest, np.where(good, np.abs(block), 0.0).max(axis=0))
+        self.whole *= np.all(~good | (block == np.rint(block)), axis=0)
         self.rows += len(block)
 
     @property
@@ -61,7 +65,7 @@ class Values:
 
 
 def values_of(opened: Sequence[Opened], fields: dict[str, Any], channels: Sequence[dict[str, Any]]) -> Values:
-    """Look at the values of all rows. Raises `UnreadableFile`."""
+    """Read all rows of some channels and return their sums. Raises `UnreadableFile`."""
     description = ImportDescription.model_validate(
         {**fields, "unit": "U", "rate_hz": 1.0, "gaps": "mark", "channels": list(channels)}
     )
@@ -74,12 +78,14 @@ def values_of(opened: Sequence[Opened], fields: dict[str, Any], channels: Sequen
 def inspected(
     opened: Sequence[Opened], fields: dict[str, Any], channel: dict[str, Any], clock: LogClock, unit: str
 ) -> tuple[InspectedClock, dict[str, Any], list[str]]:
-    """Inspect a clock; return what was found, the description's fields that it needs, and what is not known.
+    """Inspect a clock; return what was found, the description's fields that it needs, and sentences on what is not
+    known.
 
     `unit`: unit of time that its name gives; empty: it gives none.
     """
     asks: list[str] = []
-    plain = {**fields, "unit": "U", "channels": [channel], "time_column": clock.column}
+    column = int(clock.column) if fields.get("header") is False else clock.column
+    plain = {**fields, "unit": "U", "channels": [channel], "time_column": column}
     if clock.unit_s is not None:
         unit = next((u for u, s in {**SECONDS, "100us": 1e-4}.items() if s == clock.unit_s), "s")
     elif not unit:
@@ -88,12 +94,12 @@ def inspected(
             asks.append(
                 f"the unit of time of {clock.column!r} is taken as {unit} by its steps: other units fit as well"
             )
-    own = {"time_column": clock.column} | ({} if unit == "s" else {"time_unit": unit})
+    own = {"time_column": column} | ({} if unit == "s" else {"time_unit": unit})
     found, problem, needed = _judged(opened, {**plain, **own})
     judged = found.clock if found is not None else None
     document: dict[str, Any] = {} if judged is None else judged.document
     view = InspectedClock(
-        column=clock.column,
+        column=column,
         meaning=clock.meaning,
         time_unit=unit,
         rate_hz=None if judged is None else judged.rate_hz,

@@ -1,5 +1,8 @@
-"""Delimited text, Parquet and Arrow as tables of the shape that logs have, with what dialects are known to mean."""
+"""Delimited text, Parquet and Arrow as tables of the shape that logs have, with the meaning that known dialects
+give.
+"""
 
+from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 import pyarrow as pa
@@ -7,14 +10,26 @@ import pyarrow.parquet as pq
 
 from bench_service.formats.columnar import is_columnar
 from bench_service.formats.errors import UnreadableFile
+from bench_service.formats.logs.dialects import guessed, in_dialect
 from bench_service.formats.logs.names import is_time, time_unit
 from bench_service.formats.logs.table import LogClock, LogColumn, LogTable
-from bench_service.formats.proposal.dialects import Table, guessed, in_dialect
 from bench_service.formats.text_look import TextLook, look
 
 
+@dataclass(frozen=True)
+class Table:
+    """A table, the name of its format, and the fields that its description needs."""
+
+    format: str
+    title: str
+    table: LogTable
+    fields: dict[str, Any] = field(default_factory=dict[str, Any])
+    time_units: dict[str, str] = field(default_factory=dict[str, str])
+    """Unit of a time column where the format or the name says it."""
+
+
 def table_of(stream: BinaryIO, name: str) -> Table:
-    """Look at a table of text or of columns. Raises `UnreadableFile`."""
+    """Return a table of text or of columns, after a look at its beginning. Raises `UnreadableFile`."""
     return _columnar(stream, name) if is_columnar(stream) else _text(look(stream, name), name)
 
 
@@ -54,6 +69,7 @@ def _text(found: TextLook, name: str) -> Table:
         fields["decimal"] = found.decimal
     if found.header_lines:
         fields["header_lines"] = found.header_lines
-    if found.names is None:
+    if found.names is None or found.units is not None:
         fields["header"] = False
-    return in_dialect(found, name, fields)
+    text = in_dialect(found, name)
+    return Table(text.format, text.title, text.table, fields, text.time_units)

@@ -1,10 +1,11 @@
-"""The way to a proposed description: format, table, columns, units, clocks, and what a person has to decide."""
+"""Makes a proposed description of a file: format, table, columns, units, clocks, and what a person has to decide."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from bench_service.formats.bounds import listed
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.import_request import ImportFile
@@ -12,7 +13,7 @@ from bench_service.formats.joined_files import Opened
 from bench_service.formats.logs.registry import format_of
 from bench_service.formats.logs.table import LogColumn, LogTable, find_table
 from bench_service.formats.own_export import OwnExport, own_export
-from bench_service.formats.proposal.choice import chosen_columns, chosen_table, missing_axes
+from bench_service.formats.proposal.choice import chosen_columns, chosen_table, missing_axes, other_tables
 from bench_service.formats.proposal.inspection import Values, inspected, values_of
 from bench_service.formats.proposal.model import InspectedClock, Proposal, ProposedColumn, ProposedTable
 from bench_service.formats.proposal.of_tables import Table, table_of
@@ -20,10 +21,16 @@ from bench_service.formats.proposal.units_seen import suspicions, with_units
 
 SHOWN_COLUMNS = 64
 MOST_TABLES = 200
+RATE_TOLERANCE = 0.01
+"""Difference of a stated rate and that of the stamps that is not worth a word."""
+NAMED_BY_PEOPLE = ("text", "phone", "xsens", "ros", "parquet", "arrow", "mat5", "hdf5", "tdms")
+"""Formats whose columns have any names."""
 
 
 def propose(file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
-    """Propose a description of one file. Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`."""
+    """Return a proposed description of one file; reads all rows. Raises `UnreadableFile`, `UnfitRecording`,
+    `BadParameter`.
+    """
     found = format_of(file.stream, form)
     if found is None:
         own = own_export(file.stream)
@@ -100,6 +107,8 @@ def _proposed(
     suspicious += [
         f"{c.column!r}: {words}" for c in clocks for words in (c.warnings if c.problem is None else [c.problem])
     ]
+    suspicious += _other_rate(table, rate_hz)
+    notes += [*_left_out(looked, columns), *other_tables(table, tables)]
     if np.any(values.finite < values.rows):
         timed["gaps"] = "mark"
     if "time_column" not in timed and rate_hz is not None:
@@ -136,6 +145,25 @@ def _clocks(
         elif "second_time_column" not in timed and clock.unit_s is not None:
             timed["second_time_column"] = clock.column
     return found, timed, asks
+
+
+def _other_rate(table: LogTable, rate_hz: float | None) -> list[str]:
+    """Say that a file states another rate than that of its stamps."""
+    if table.rate_hz is None or rate_hz is None or abs(rate_hz / table.rate_hz - 1.0) <= RATE_TOLERANCE:
+        return []
+    return [
+        f"the file states a rate of {table.rate_hz:g} Hz, its stamps have {rate_hz:.6g} Hz: is the unit of time right?"
+    ]
+
+
+def _left_out(looked: Table, columns: Sequence[LogColumn]) -> list[str]:
+    """Name the columns of a file of any names that are neither channel nor time."""
+    if looked.format not in NAMED_BY_PEOPLE:
+        return []
+    table = looked.table
+    used = {c.name for c in columns} | {c.column for c in table.clocks} | {c.name for c in table.columns if c.channel}
+    others = [c.name for c in table.columns if c.name and c.name not in used]
+    return [f"columns left out, whose names tell no channel: {listed(others)}"] if others else []
 
 
 def _rate(clocks: Sequence[InspectedClock], timed: dict[str, Any], table: LogTable) -> float | None:

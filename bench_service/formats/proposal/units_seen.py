@@ -1,4 +1,4 @@
-"""Units and scales held against what a unit at rest must show: |f| near g."""
+"""Units and scales compared with what a unit at rest must show: |f| near g."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ _FASTEST_RAD_S = 40.0
 def with_units(
     columns: Sequence[LogColumn], values: Values, rate_hz: float | None
 ) -> tuple[list[LogColumn], list[str], list[str]]:
-    """Give columns without a unit the likely one; return them, what is not known, and notes."""
+    """Return the columns, those without a unit with the likely one; sentences on what is not known; and notes."""
     asks: list[str] = []
     notes: list[str] = []
     found = list(columns)
@@ -32,7 +32,9 @@ def with_units(
         if not places:
             continue
         quantity = found[places[0]].quantity
-        if quantity is Quantity.SPECIFIC_FORCE:
+        if counts := _counts(found, places, values):
+            unit, sure, why = "count", False, counts
+        elif quantity is Quantity.SPECIFIC_FORCE:
             unit, sure, why = _force_unit(found, places, values)
         elif quantity is Quantity.VELOCITY_INCREMENT:
             unit, sure, why = "m/s", False, "increments"
@@ -54,6 +56,16 @@ def with_units(
     return found, asks, notes
 
 
+def _counts(columns: Sequence[LogColumn], places: Sequence[int], values: Values) -> str:
+    """Say why columns are taken for counts: whole numbers whose unit gravity does not tell; empty: they are not."""
+    whole = all(values.whole[i] and columns[i].scale == 1.0 for i in places)
+    if not whole or not any(values.largest[i] > 1.0 for i in places):
+        return ""
+    if columns[places[0]].quantity is Quantity.SPECIFIC_FORCE and _force_unit(columns, places, values)[1]:
+        return ""
+    return "whole numbers, as a converter gives them; give unit and scale, or leave the counts to a calibration"
+
+
 def _force_unit(columns: Sequence[LogColumn], places: Sequence[int], values: Values) -> tuple[str, bool, str]:
     size = sqrt(sum((columns[i].scale * float(values.means[i])) ** 2 for i in places))
     for unit, gravity in _FORCE_UNITS.items():
@@ -63,7 +75,7 @@ def _force_unit(columns: Sequence[LogColumn], places: Sequence[int], values: Val
 
 
 def suspicions(columns: Sequence[LogColumn], values: Values, rate_hz: float | None) -> list[str]:
-    """Describe values that no unit of these scales at rest has, and channels that do not move."""
+    """Return sentences about values that no unit of these scales at rest has, and about channels that do not move."""
     found = [
         f"channel {c.channel} ({c.name}) has one value throughout: {values.means[i]:.6g}"
         for i, c in enumerate(columns)

@@ -38,7 +38,7 @@ SPOOLED_BYTES = 2_000 * MEGABYTE
 
 
 def serve(line: socket.socket) -> None:
-    """Answer the one request that comes on a line."""
+    """Answer the one request that comes on a line: limit this process, read the files, send findings and samples."""
     try:
         _, descriptors, _, _ = socket.recv_fds(line, 1, MOST_FILES)
         send(line, CHILD, str(os.getpid()).encode())

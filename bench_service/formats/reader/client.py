@@ -54,7 +54,7 @@ _BEGIN = (
 
 
 class NoReader(Exception):
-    """The process that reads files cannot be begun, or is gone."""
+    """Raised where the process that reads files cannot be begun, or is gone."""
 
 
 @dataclass
@@ -111,7 +111,9 @@ class _Reading:
 
 
 class FileReader:
-    """Reads files in processes of their own. `close` ends the host that forks them."""
+    """Reads imported files in processes of their own, with limits of memory and time. `close` ends the host that forks
+    them.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -147,7 +149,7 @@ class FileReader:
             yield _Reading(description, found["rate_hz"], found["count"], dtype, found["source"], line)
 
     def describe(self, file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
-        """Propose a description of a file; `unit`, `form` and `table` where they are known.
+        """Return a proposed description of a file; `unit`, `form` and `table` where they are known.
 
         Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`, and `NoRoom`, `NoReader`.
         """

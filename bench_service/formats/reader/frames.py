@@ -15,7 +15,7 @@ CHILD, FOUND, SAMPLES, END, REFUSED, PROPOSED = b"P", b"H", b"B", b"E", b"X", b"
 
 
 class Broken(Exception):
-    """The other side is gone, or sent no valid frame."""
+    """Raised where the other side is gone, or sent no valid frame."""
 
 
 def send(line: socket.socket, kind: bytes, payload: bytes | memoryview) -> None:
@@ -30,7 +30,9 @@ def send_json(line: socket.socket, kind: bytes, document: Any) -> None:
 
 
 def receive(line: socket.socket, before: Callable[[], None] = lambda: None) -> tuple[bytes, bytes]:
-    """Receive the next frame; `before` is called ahead of each wait. Raises `Broken`, `TimeoutError`."""
+    """Wait for the next frame and return its kind and content; `before` is called ahead of each wait. Raises `Broken`,
+    `TimeoutError`.
+    """
     kind, length = HEAD.unpack(_exactly(line, HEAD.size, before))
     if length > LARGEST:
         raise Broken(f"a frame of {length} bytes")

@@ -12,7 +12,7 @@ from bench_service.formats.reader.child import serve
 
 
 def main(descriptor: int) -> None:
-    """Fork a child for each line that comes through the socket of that descriptor."""
+    """Fork a child for each line that comes through the socket of that descriptor, until the service closes it."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # children are not waited for
     for number in (signal.SIGINT, signal.SIGHUP):  # Ctrl-C, a closed terminal: for the service, which closes the line
         signal.signal(number, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Refusals that a reading process sent, as the errors that they were there."""
+"""Conversion of refusals that a reading process sent back into the errors that it raised."""
 
 import logging
 from typing import Any
@@ -11,11 +11,11 @@ logger = logging.getLogger(__name__)
 
 
 class NoRoom(Exception):
-    """The temporary folder is full."""
+    """Raised where the temporary folder is full."""
 
 
 def refused(refusal: dict[str, Any], bounds: Bounds) -> Exception:
-    """Rebuild the error that a child met."""
+    """Return the error that a child met, rebuilt from what it sent."""
     kind = refusal["kind"]
     if kind == "unreadable":
         return UnreadableFile(refusal["name"], refusal["problem"])

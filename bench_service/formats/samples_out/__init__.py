@@ -1,1 +1,1 @@
-"""Samples for other software: as a sheet with units, in its formats, and many as one zip."""
+"""Samples for other software: as a table with units ("sheet"), in its file formats, and many as one zip."""

@@ -62,7 +62,9 @@ ABSENT = -1.0
 
 
 def imu_messages(stamps_ns: np.ndarray, rates: Array | None, forces: Array | None) -> np.ndarray:
-    """Messages of samples: `stamps_ns` (n,) from the epoch, rates (n, 3) in rad/s, specific forces (n, 3) in m/s²."""
+    """Return the messages of samples in CDR, (n, bytes): `stamps_ns` (n,) from the epoch, rates (n, 3) in rad/s,
+    specific forces (n, 3) in m/s².
+    """
     made = np.zeros(len(stamps_ns), MESSAGE)
     made["encapsulation"] = b"\x00\x01\x00\x00"
     made["sec"], made["nanosec"] = np.divmod(stamps_ns, 1_000_000_000)
@@ -79,6 +81,6 @@ def imu_messages(stamps_ns: np.ndarray, rates: Array | None, forces: Array | Non
 
 
 def columns_of(names: Sequence[str], triad: str, unit: str) -> list[int] | None:
-    """Places of a triad's columns x, y, z in SI among the names of a sheet; None where one is missing."""
+    """Return the places of a triad's columns x, y, z in SI among the names of a sheet; None where one is missing."""
     wanted = [f"{triad}_{axis}_{unit}" for axis in "xyz"]
     return [names.index(name) for name in wanted] if set(wanted) <= set(names) else None

@@ -32,7 +32,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Sheet:
-    """Columns of equal length, whose rows come in blocks: one array a column each time."""
+    """Table of samples: columns of equal length, whose rows come in blocks, one array a column each time."""
 
     columns: tuple[Column, ...]
     about: Mapping[str, str]
@@ -55,7 +55,7 @@ TIME = Column("time_s", np.dtype(np.float64), {"unit": "s", "quantity": "time si
 
 
 def raw_sheet(part: Extract, blocks: Iterable[RawArray]) -> Sheet:
-    """Samples as they are stored; scale, offset and unit of each column are its attributes."""
+    """Return samples as a sheet of stored values; scale, offset and unit of each column are its attributes."""
     kind = np.dtype(sample_type(part.dtype))
     columns = tuple(
         Column(
@@ -70,7 +70,9 @@ def raw_sheet(part: Extract, blocks: Iterable[RawArray]) -> Sheet:
 
 
 def physical_sheet(part: Extract, blocks: Iterable[RawArray], treatment: Treatment | None = None) -> Sheet:
-    """Samples in SI. Raises `BadParameter` for a calibration that does not fit the channels."""
+    """Return samples as a sheet in SI units, corrected and decimated where wanted. Raises `BadParameter` for a
+    calibration that does not fit the channels.
+    """
     asked = treatment or Treatment()
     if not 1 <= asked.decimate <= LARGEST_FACTOR:
         raise BadParameter("decimate", asked.decimate, f"1 … {LARGEST_FACTOR}")

@@ -59,7 +59,9 @@ class _Watch:
 
 
 class EventHub:
-    """All listeners to jobs in this process."""
+    """Fan-out of jobs' events to the listeners of this process (event streams, pages): the events of each job are read
+    once.
+    """
 
     def __init__(self, jobs: JobStore, board: LiveBoard, frames: Frames, lag: int = LAG, recent: int = RECENT) -> None:
         self.dropped = 0
@@ -80,7 +82,7 @@ class EventHub:
         return sum(len(watch.listeners) for watch in tuple(self._watches.values()))
 
     def wake(self, job_id: str) -> None:
-        """Look for new events of a job now; from any thread."""
+        """Have a job's events read now, because one was committed; from any thread, never waits."""
         watch = self._watches.get(job_id)
         if watch is not None and not watch.loop.is_closed():
             watch.loop.call_soon_threadsafe(watch.woken.set)

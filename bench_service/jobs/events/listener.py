@@ -9,16 +9,16 @@ from bench_service.model.job import Event
 
 
 class Frames(Protocol):
-    """The wire format of the messages to listeners."""
+    """The wire format of the messages to listeners; the API implements it as server-sent events. Interface."""
 
     @property
     def quiet(self) -> bytes:
-        """The heartbeat: nothing has happened for a while."""
+        """Return the message that is sent as a heartbeat while nothing happens."""
         ...
 
     @property
     def dropped(self) -> bytes:
-        """The last message to a listener that was too slow."""
+        """Return the last message to a listener that was dropped because it was too slow."""
         ...
 
     def event(self, event: Event) -> bytes: ...
@@ -27,7 +27,7 @@ class Frames(Protocol):
 
 
 class Listener:
-    """The queue of messages to one listener, and its state."""
+    """Queue of messages to one listener, bounded: a listener that is too slow is dropped."""
 
     def __init__(self, after: int, joined_at: int, lag: int) -> None:
         """Set up for a client that has events up to `after`; `joined_at`: the newest sequence when it joined."""
@@ -42,7 +42,9 @@ class Listener:
         self._woken = asyncio.Event()
 
     def put(self, sequence: int, frame: bytes) -> bool:
-        """Queue an event's message. False where the queue is full: the listener is dropped, and its queue emptied."""
+        """Queue an event's message; return False where the queue is full: the listener is dropped, and its queue
+        emptied.
+        """
         if len(self._frames) >= self._lag:
             self.dropped = self.ended = True
             self._frames.clear()
@@ -68,7 +70,7 @@ class Listener:
         self._wake()
 
     async def next(self) -> bytes:
-        """All waiting messages in one piece, as soon as there is any; empty: the end."""
+        """Wait until there is a message, and return all waiting ones in one piece; empty bytes at the end."""
         while True:
             frames = [frame for sequence, frame in self._frames if sequence > self.after]
             if self._frames:

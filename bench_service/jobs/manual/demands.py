@@ -22,9 +22,9 @@ Values = dict[str, Any]
 
 
 def checked(kind: DemandKind, values: Mapping[str, Any], bench: BenchDescription) -> Values:
-    """The demand's values with those that were left out, within the limits of a bench that stands still.
-
-    Raises `BadParameter` naming field, value and range; angles and rates are checked again where the table stands.
+    """Return the demand's values, with those that were left out filled in, within the limits of a bench that stands
+    still. Raises `BadParameter` naming field, value and range; angles and rates are checked again where the table
+    stands.
     """
     return _CHECKS[kind](values, bench)
 
@@ -113,7 +113,9 @@ _CHECKS: dict[DemandKind, Callable[[Mapping[str, Any], BenchDescription], Values
 
 
 def constant_rate(values: Mapping[str, Any], here: TableAngles, bench: BenchDescription) -> ConstantRate:
-    """The motion of a rate demand, from where the table stands. Raises `BadParameter` where the axis' range ends."""
+    """Return the motion of a rate demand, from where the table stands. Raises `BadParameter` where it would pass the
+    end of the axis' range.
+    """
     rate = ConstantRate(values["axis"], values["rate_deg_s"], values["duration_s"], values["ramp_s"])
     limits = bench.axis(rate.axis)
     begin: float = getattr(here, f"{rate.axis}_deg")
@@ -129,7 +131,7 @@ def constant_rate(values: Mapping[str, Any], here: TableAngles, bench: BenchDesc
 
 
 def angles(values: Mapping[str, Any], here: TableAngles) -> TableAngles:
-    """The angles of a demand; an axis that it leaves out stays where it stands."""
+    """Return the angles that a demand asks for [deg]; an axis that it leaves out stays where it stands."""
     outer, middle, inner = (
         getattr(here, f"{axis}_deg") if values[f"{axis}_deg"] is None else values[f"{axis}_deg"] for axis in AXES
     )

@@ -19,7 +19,9 @@ log = logging.getLogger(__name__)
 
 
 class Presence:
-    """Gives signs of life from `begin` to `end`, in a thread of its own."""
+    """Thread of a process that answers clients: writes its heartbeat into every open lease of manual mode, each
+    `BEAT_S`.
+    """
 
     def __init__(self, store: ManualStore, beat_s: float = BEAT_S) -> None:
         self._store, self._beat_s = store, beat_s
@@ -27,11 +29,11 @@ class Presence:
         self._thread = Thread(target=self._run, name="manual presence", daemon=True)
 
     def begin(self) -> None:
-        """Start the thread."""
+        """Start the thread of heartbeats."""
         self._thread.start()
 
     def end(self) -> None:
-        """Stop the thread, if it was started."""
+        """Stop the thread and wait for it, if it was started."""
         self._ending.set()
         if self._thread.is_alive():
             self._thread.join()

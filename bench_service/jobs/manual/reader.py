@@ -23,7 +23,9 @@ log = logging.getLogger(__name__)
 
 
 class LeaseReader:
-    """Carries demands to a session and their outcomes back, until `end`."""
+    """Thread that reads the demands of one lease from the database for a session, and writes their outcomes back, until
+    `end`.
+    """
 
     def __init__(self, store: ManualStore, lease_id: str, wake: Event) -> None:
         self._store, self._lease_id, self._wake = store, lease_id, wake
@@ -40,17 +42,19 @@ class LeaseReader:
         """The reason why the lease has to end; empty: it continues."""
 
     def begin(self, session: ManualSession) -> None:
-        """Begin to read for a session."""
+        """Start the thread, which gives demands to this session."""
         self._thread = Thread(target=self._run, args=(session,), name="manual lease", daemon=True)
         self._thread.start()
 
     def tell(self, demand: ManualDemand, state: DemandState, answer: Answer) -> None:
-        """Have an outcome written; never waits."""
+        """Queue the outcome of a demand for writing; never waits."""
         self._told.put((demand, state, answer))
         self._wake.set()
 
     def silent(self) -> bool:
-        """Whether the database has not answered for so long that the lease ends; `because` says so then."""
+        """Return whether the database has not answered for so long that the lease ends; `because` then has the
+        reason.
+        """
         if monotonic_s() - self._answered_s <= HANGS_S:
             return False
         self.because = self.because or f"the database has not answered for {HANGS_S:g} s"

@@ -21,7 +21,9 @@ AGAIN_S = 2.0
 
 
 class UnitReadings:
-    """Means of the unit's channels while time passes."""
+    """Means of the unit's channels in manual mode, read while bench time passes: `values`, the time of reading, and the
+    problem where they cannot be read.
+    """
 
     def __init__(self, bench: Bench) -> None:
         self._imu = getattr(bench, "inner", bench).imu
@@ -36,13 +38,15 @@ class UnitReadings:
         """The reason why the last reading failed; empty: it did not."""
 
     def powered(self, on: bool) -> None:
-        """Note whether the unit has power now."""
+        """Note whether the unit has power now; without power the values are dropped."""
         if not on:
             self.values, self.at_s, self.problem = (), None, ""
         self._on = on
 
     async def read(self, seconds: float) -> bool:
-        """Read the unit for some time, which passes meanwhile; False where it was not read, and no time passed."""
+        """Read the unit's channels for some seconds of bench time; return False where it was not read, and no time
+        passed.
+        """
         if not self._on or monotonic_s() < self._again_s:
             return False
         try:

@@ -22,7 +22,7 @@ LONGEST_MIN = 240.0
 
 @dataclass(frozen=True)
 class ManualRequest:
-    """A client's request for manual mode."""
+    """A client's request for manual mode: bench, unit, holder, reason, duration."""
 
     bench: str
     unit: str | None
@@ -35,7 +35,9 @@ class ManualRequest:
 
 
 class ManualService:
-    """Leases of all benches; the worker of each runs them (`bench_service.jobs.manual.runner`)."""
+    """Operations of clients on leases of manual mode, on all benches; each bench's worker carries them out
+    (`bench_service.jobs.manual.runner`).
+    """
 
     def __init__(
         self, stores: JobStores, benches: BenchDirectory, queues: QueueService, wake: Callable[[str], None]
@@ -66,24 +68,28 @@ class ManualService:
         return begun
 
     def lease(self, bench_id: str, lease_id: str) -> ManualLease:
-        """Return a lease of a bench. Raises `NotFound`."""
+        """Return a lease of a bench. Raises `NotFound`, also for a lease of another bench."""
         found = self._stores.manual.get(lease_id)
         if found.bench != bench_id:
             raise NotFound("manual lease", lease_id, f"it is one of bench {found.bench}")
         return found
 
     def on(self, bench_id: str) -> ManualLease | None:
-        """The open lease of a bench; None where it is not in manual mode. Raises `NotFound`."""
+        """Return the open lease of a bench; None where it is not in manual mode. Raises `NotFound` for an unknown
+        bench.
+        """
         self._benches.description(bench_id)
         return self._stores.manual.open_on(bench_id)
 
     def leases(self, bench_id: str, after: str | None, limit: int) -> Page[ManualLease]:
-        """Leases of a bench, newest first. Raises `NotFound`."""
+        """Return one page of the leases of a bench, newest first. Raises `NotFound` for an unknown bench."""
         self._benches.description(bench_id)
         return self._stores.manual.list(bench=bench_id, after=after, limit=limit)
 
     def renew(self, bench_id: str, lease_id: str, minutes: float, holder: str) -> ManualLease:
-        """Let a lease end later, or sooner. Raises `NotAllowed` for another than its holder, `ManualRefused`."""
+        """Set the end of a lease to some minutes from now, and return the lease. Raises `NotAllowed` for another than
+        its holder, `ManualRefused` once it has ended.
+        """
         _require_holder(self.lease(bench_id, lease_id), holder)
         at = now()
         renewed = self._stores.manual.renew(lease_id, at + timedelta(minutes=_minutes(minutes)), at)
@@ -115,11 +121,11 @@ class ManualService:
         return accepted
 
     def demand_of(self, bench_id: str, lease_id: str, key: str) -> ManualDemand:
-        """Return the demand of a key, with what became of it. Raises `NotFound`."""
+        """Return the demand that was stored under a key, with its state and answer. Raises `NotFound`."""
         return self._stores.manual.get_demand(self.lease(bench_id, lease_id).id, key)
 
     def demands(self, bench_id: str, lease_id: str, after: str | None, limit: int) -> Page[ManualDemand]:
-        """Demands of a lease, newest first. Raises `NotFound`."""
+        """Return one page of the demands of a lease, newest first. Raises `NotFound`."""
         return self._stores.manual.demands(self.lease(bench_id, lease_id).id, after=after, limit=limit)
 
 

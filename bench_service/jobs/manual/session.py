@@ -58,7 +58,9 @@ class ManualSession(DrivenBench):
         self._failure: BenchError | None = None
 
     def hold(self) -> None:
-        """Hold the bench until the lease ends. Raises `Stopped`, `Disconnected`, `ShuttingDown`, `StorageFailure`."""
+        """Hold the bench and block until the lease ends. Raises `Stopped`, `Disconnected`, `ShuttingDown`,
+        `StorageFailure`.
+        """
         self._run(self._life())
 
     def leave(self, because: str) -> None:
@@ -101,7 +103,7 @@ class ManualSession(DrivenBench):
 
     @property
     def expired(self) -> bool:
-        """Whether the lease's time is over."""
+        """True once the lease's time is over, by the monotonic clock."""
         return monotonic_s() >= self._until_s
 
     async def _life(self) -> None:

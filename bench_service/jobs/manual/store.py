@@ -1,4 +1,4 @@
-"""PORT of memory of manual mode: leases and their demands. Every method is one transaction."""
+"""Interface of the store of manual mode: leases and their demands. Every method is one transaction."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -10,7 +10,7 @@ from bench_service.model.records import Idempotency, Page
 
 @dataclass(frozen=True)
 class LeaseNews:
-    """A lease and what a worker must know of it, read at one moment."""
+    """A lease, its new demands and its bench's stops, read at one moment for the worker that runs it."""
 
     lease: ManualLease
     stopped: str
@@ -20,7 +20,7 @@ class LeaseNews:
 
 
 class ManualStore(Protocol):
-    """The stored leases of all benches."""
+    """Store of the leases of manual mode and their demands, of all benches. Interface; the SQL is in `persistence`."""
 
     def begin(self, lease: ManualLease, idempotency: Idempotency | None = None) -> ManualLease:
         """Store a new lease; with a known key and the same fingerprint, return the one that it made.
@@ -35,35 +35,41 @@ class ManualStore(Protocol):
         ...
 
     def open_on(self, bench: str) -> ManualLease | None:
-        """The lease of a bench that has not ended, whether or not its time is over."""
+        """Return the lease of a bench that has not ended, whether or not its time is over; None where there is none."""
         ...
 
     def list(self, *, bench: str | None = None, after: str | None = None, limit: int = 50) -> Page[ManualLease]:
-        """List leases, newest first."""
+        """Return one page of leases, of one bench or all, newest first."""
         ...
 
     def take(self, lease_id: str, at: datetime, process: str) -> ManualLease | None:
-        """Note that a worker runs it from now on; None where it has ended, its time is over, or another one took it."""
+        """Store that this worker runs the lease from now on, and return it; None where it has ended, its time is over,
+        or another worker took it.
+        """
         ...
 
     def news(self, lease_id: str) -> LeaseNews:
-        """Read what a worker must know. Raises `NotFound`."""
+        """Return what the lease's worker must know now. Raises `NotFound`."""
         ...
 
     def renew(self, lease_id: str, until: datetime, at: datetime) -> ManualLease:
-        """Move a lease's end. Raises `ManualRefused` where it does not live, `NotFound`."""
+        """Move a lease's end and return the lease. Raises `ManualRefused` where it has ended, `NotFound`."""
         ...
 
     def ask_end(self, lease_id: str, by: str, at: datetime) -> ManualLease:
-        """Ask for a lease's end: at once where no worker has taken it. One that has ended stays as it is."""
+        """Request a lease's end, and return the lease: it ends at once where no worker has taken it. One that has ended
+        stays as it is.
+        """
         ...
 
     def end(self, lease_id: str, at: datetime, because: str, safe: bool | None) -> None:
-        """End a lease; its open demands are stopped. A second end changes nothing."""
+        """End a lease, with the reason and whether the bench is safe; its open demands become stopped. A second end
+        changes nothing.
+        """
         ...
 
     def hear(self) -> None:
-        """Count a sign of life of this process for every open lease."""
+        """Raise the heartbeat count of every open lease, in the name of this process."""
         ...
 
     def demand(self, demand: ManualDemand, at: datetime) -> ManualDemand:
@@ -75,13 +81,13 @@ class ManualStore(Protocol):
         ...
 
     def get_demand(self, lease_id: str, key: str) -> ManualDemand:
-        """Return the demand of a key. Raises `NotFound`."""
+        """Return the demand of a lease that was stored under a key. Raises `NotFound`."""
         ...
 
     def demands(self, lease_id: str, *, after: str | None = None, limit: int = 50) -> Page[ManualDemand]:
-        """List demands of a lease, newest first."""
+        """Return one page of the demands of a lease, newest first."""
         ...
 
     def answer(self, demand_id: str, state: DemandState, answer: Answer, at: datetime) -> None:
-        """Note what became of a demand; one that is over stays as it is."""
+        """Store the state and answer of a demand; one that is over stays as it is."""
         ...

@@ -1,4 +1,4 @@
-"""Work of demands of manual mode on an open bench: the commands of each kind, and the sentence that answers it."""
+"""Execution of manual demands on an open bench: the commands of each kind, and the sentence that answers it."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -15,7 +15,9 @@ TICK_S = 0.1
 
 
 class DemandWork:
-    """Carries out demands on the devices of a bench; their order, refusals and end are the session's."""
+    """Carries out demands of manual mode on the devices of an open bench; their order, refusals and end belong to
+    `ManualSession`.
+    """
 
     def __init__(self, bench: Bench, sensors: UnitReadings, leave_motion: Callable[[], Awaitable[None]]) -> None:
         """Set up with `leave_motion`, which a halt calls first: it leaves the motion under way, if there is one."""
@@ -25,11 +27,13 @@ class DemandWork:
         """Held by a demand on chamber or supply: two at once would mix their statements."""
 
     async def do(self, demand: ManualDemand) -> str:
-        """Carry out a demand; the sentence for its answer. Raises `BadParameter` and the devices' `BenchError`."""
+        """Carry out a demand, wait until the devices have done it, and return the sentence for its answer. Raises
+        `BadParameter` and the devices' `BenchError`.
+        """
         return await self._KINDS[demand.kind](self, demand.values)
 
     async def time_passes(self, seconds: float) -> None:
-        """Let time pass in the bench's clock; with a unit that has power, while its samples are read."""
+        """Let bench time pass [s]; with a unit that has power, while its samples are read."""
         if not await self._sensors.read(seconds):
             await self._bench.clock.sleep(seconds)
 
@@ -61,7 +65,7 @@ class DemandWork:
             if chamber is None:
                 raise BadParameter("kind", "chamber", "another demand: the bench was opened without its chamber")
             await chamber.command(values["temperature_c"], values["ramp_c_min"])
-            return f"led to {values['temperature_c']:g} °C at {values['ramp_c_min']:g} K/min"
+            return f"commanded to {values['temperature_c']:g} °C at {values['ramp_c_min']:g} K/min"
 
     async def _supply_on(self, values: dict[str, Any]) -> str:
         async with self._order:

@@ -47,7 +47,7 @@ async function approvals() {
   const [all, known] = await Promise.all([read("/api/v1/procedures"), read("/api/v1/approvals")]), by = new Map(known.map((one) => [one.procedure, one]));
   at("approvals").replaceChildren(table(t("Procedures that operators may run"), [t("Procedure"), t("Version"), t("Approved"), t("Do")], all.map((one) => {
     const found = by.get(one.name), path = `/api/v1/procedures/${part(one.name)}/approval`, current = found && found.version === one.version;
-    return h("tr", { "data-approval": one.name }, h("th", { scope: "row" }, one.name), h("td", {}, one.version),
+    return h("tr", { "data-approval": one.name }, h("th", { scope: "row", title: one.name }, t(one.title)), h("td", {}, one.version),
       h("td", {}, found ? [h("span", { class: `badge ${current ? "pass" : "error"}` }, current ? t("approved") : `${t("only version")} ${found.version}`), " ", moment(found.at), found.by ? ` ${t("by")} ${found.by}` : ""] : t("not approved")),
       h("td", {}, current ? verb(t("Withdraw"), { method: "DELETE", path, then: approvals, confirm: { title: t("Withdraw the approval?"), lost: t("Operators may not start it any more; jobs in the queue stay."), verb: t("Withdraw") } }) : verb(t("Approve"), { method: "PUT", path, then: approvals })));
   })));

@@ -3,7 +3,28 @@ import { ask, iAm, me } from "./api.js";
 import { h } from "./dom.js";
 import { t } from "./words.js";
 
+const BEHIND = ".skip, header, main, footer";  // the stop bar and what people are asked stay within reach
 let dialogs = 0;
+
+/** Opens a dialog below the stop bar, not as a modal one: that would take the stop away. Gives what closes it. */
+function opened(box) {
+  const bar = document.getElementById("stopbar"), behind = [...document.querySelectorAll(BEHIND)];
+  const place = () => { box.style.top = `${bar ? bar.getBoundingClientRect().bottom : 0}px`; };
+  const watch = new ResizeObserver(place), shut = () => {
+    watch.disconnect();
+    document.removeEventListener("keydown", escape);
+    for (const one of behind) one.inert = false;  // before it closes: the focus goes back to what had it
+    box.close();
+  };
+  const escape = (event) => { if (event.key === "Escape") shut(); };
+  document.body.append(box);
+  box.show();
+  for (const one of behind) one.inert = true;
+  document.addEventListener("keydown", escape);
+  place();
+  if (bar) watch.observe(bar);
+  return shut;
+}
 
 /** Asks once: gives {by, reason} or null where the person does not want it after all. */
 export function confirmed({ title, lost, verb, reason = null, by = false, kind = "danger" }) {
@@ -12,18 +33,17 @@ export function confirmed({ title, lost, verb, reason = null, by = false, kind =
     const name = by && h("label", {}, t("Your name"), h("input", { name: "by", required: true, maxlength: 200, autocomplete: "name", value: me() }));
     const why = reason && h("label", {}, reason.label, h("input", { name: reason.name || "reason", maxlength: 500, required: reason.required, placeholder: reason.hint, type: reason.secret ? "password" : "text", autocomplete: reason.secret ? "new-password" : "off" }));
     const form = h("form", { method: "dialog" }, h("h2", { id }, title), lost && h("p", {}, lost), name, why,
-      h("div", { class: "verbs" }, h("button", { type: "submit", class: kind }, verb), h("button", { type: "button", class: "quiet", onclick: () => box.close() }, t("Back"))));
+      h("div", { class: "verbs" }, h("button", { type: "submit", class: kind }, verb), h("button", { type: "button", class: "quiet", onclick: () => shut() }, t("Back"))));
     const box = h("dialog", { "aria-labelledby": id }, form);
     let given = null;
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       given = Object.fromEntries([...new FormData(form)].filter(([, value]) => value !== ""));
       if (given.by) iAm(given.by);
-      box.close();
+      shut();
     });
     box.addEventListener("close", () => { box.remove(); settle(given); });
-    document.body.append(box);
-    box.showModal();
+    const shut = opened(box);
   });
 }
 

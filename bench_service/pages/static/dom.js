@@ -17,6 +17,11 @@ export function h(tag, attributes = {}, ...children) {
 
 export const badge = (text, kind = text) => h("span", { class: `badge ${kind}` }, t(text));
 
+const titles = JSON.parse(document.documentElement.dataset.titles || "{}");
+
+/** The title of a procedure or a method, in the page's language; its name where the service has not read it yet. */
+export const titled = (name) => titles[name] || name;
+
 /** Replaces the content only where it changes: what a reader has selected or focused stays. */
 export function fill(element, ...children) {
   const held = element.contains(document.activeElement) && document.activeElement.matches("input, textarea, select");
@@ -37,6 +42,9 @@ export function bytes(count) {
 const ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;
 const LOCAL = new Intl.DateTimeFormat("sv-SE", { dateStyle: "short", timeStyle: "medium" });
 const NAMED = new Intl.DateTimeFormat(undefined, { timeZoneName: "short" });
+
+/** Time of day as in `moment`. */
+export const clock = (at) => at.toLocaleTimeString("sv-SE", { hour: "2-digit", minute: "2-digit", second: "2-digit", timeZoneName: "short" });
 
 /** Local time with its zone named; UTC is in the tooltip. */
 export function moment(iso) {

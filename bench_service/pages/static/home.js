@@ -1,6 +1,6 @@
 // The first page, live: each bench with what it does, its stops and their release, and the latest jobs.
 import { part, send } from "./api.js";
-import { badge, fill, h, moment, number, short, span } from "./dom.js";
+import { badge, fill, h, moment, number, short, span, titled } from "./dom.js";
 import { busy } from "./act.js";
 import { iAm, me } from "./api.js";
 import * as feed from "./feed.js";
@@ -49,10 +49,10 @@ function show({ bench, job }) {
   const { safety } = bench, free = !job && !["busy", "manual"].includes(bench.state);
   fill(card.querySelector(".state"),
     h("p", {}, badge(bench.state), " ", job
-      ? [t("Busy with"), " ", h("a", { href: job.page }, job.procedure), ` ${t("on")} `, h("a", { href: `/units/${part(job.unit)}` }, job.unit), ` (#${job.number}). `,
-        progress ? `${progress.label}. ${t("Left:")} ${span(progress.eta_s)} ${t("of bench time")}, ${span(progress.eta_wall_s)} ${t("of real time")}.` : ""]
+      ? [t("Busy with"), " ", h("a", { href: job.page, title: job.procedure }, titled(job.procedure)), ` ${t("on")} `, h("a", { href: `/units/${part(job.unit)}` }, job.unit), ` (#${job.number}). `, job.prompt ? `${t("It waits for a person.")} ` : "",
+        progress ? `${progress.label}. ${t("Left:")} ${span(progress.eta_s)} ${t("of bench time")}${progress.eta_wall_s === null ? "" : `, ${span(progress.eta_wall_s)} ${t("of real time")}`}.` : ""]
       : bench.state === "manual" ? h("a", { href: `/benches/${part(bench.id)}/manual` }, t("In manual mode."))
-      : bench.driven_by ? t("Idle.") : t("No worker drives it now: its jobs wait."), bench.queued ? [" ", h("a", { href: "/queue" }, `${bench.queued} ${t("queued")}`), "."] : ""),
+      : bench.driven_by ? (bench.state === "stopped" ? t("Nothing runs; jobs wait until the stop is released.") : t("Idle.")) : t("No worker drives it now: its jobs wait."), bench.queued ? [" ", h("a", { href: "/queue" }, `${bench.queued} ${t("queued")}`), "."] : ""),
     job && h("progress", { max: 1, value: progress ? progress.fraction : job.progress.fraction, "aria-label": t("Progress") }),
     h("p", { class: safety.safe !== true && free ? "warning" : "note" }, job && !bench.stops.length && safety.safe === false
       ? `${t("It is in use:")} ${safety.devices.unsafe.join(", ")}.` : safety.explanation),
@@ -61,7 +61,7 @@ function show({ bench, job }) {
 
 function jobs({ items }) {
   fill(document.getElementById("jobs"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Latest jobs") }, h("table", {}, h("thead", {}, h("tr", {}, ...["Procedure", "Unit", "State", "Verdict", "Stations", "Submitted", "Labels", "Job"].map((name) => h("th", {}, t(name))))),
-    h("tbody", {}, ...items.map((job) => h("tr", {}, h("td", {}, h("a", { href: job.page }, job.procedure)), h("td", {}, job.unit), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
+    h("tbody", {}, ...items.map((job) => h("tr", {}, h("td", {}, h("a", { href: job.page, title: job.procedure }, titled(job.procedure))), h("td", {}, job.unit), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
       h("td", { class: "n" }, `${job.progress.station} / ${job.progress.stations}`), h("td", {}, moment(job.created_at)), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, `#${job.number}`))))))));
 }
 

@@ -92,7 +92,7 @@ begin.addEventListener("submit", (event) => {
 });
 
 document.addEventListener("keydown", (event) => {
-  if (event.key !== "Escape" || !lease || document.querySelector("dialog[open]")) return;
+  if (event.key !== "Escape" || !lease) return;
   const form = document.querySelector('form.demand[data-kind="halt"]');
   busy(form.querySelector("button"), form.querySelector("output"), () => demand("halt", {}));
 });

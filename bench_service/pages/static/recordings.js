@@ -2,7 +2,7 @@
 import { ask, part, read } from "./api.js";
 import { busy } from "./act.js";
 import * as batches from "./batches.js";
-import { bytes, h, fill, moment, number, span } from "./dom.js";
+import { bytes, h, fill, moment, number, span, titled } from "./dom.js";
 import { SchemaForm } from "./form.js";
 import "./import_wizard.js";
 import { t } from "./words.js";
@@ -10,13 +10,25 @@ import { t } from "./words.js";
 const at = (id) => document.getElementById(id), search = at("search"), chosen = new Map();
 let next = null, shown = null, body = null, methods = [], form = null, key = crypto.randomUUID();
 
-function count() { at("chosen").textContent = t("{n} chosen", { n: chosen.size }) + (chosen.size ? `: ${[...new Set([...chosen.values()].map((one) => one.unit))].join(", ")}` : ""); }
+const jobs = new Map();
+
+const nameOf = (one) => one.station ? `${one.station.index}: ${one.station.label}` : ((one.source.files || [])[0] || {}).name || one.id;
+
+/** The job of a recording by number and procedure; each job is asked for once. */
+function jobOf(id) {
+  const link = h("a", { href: `/jobs/${id}` }, t("job"));
+  if (!jobs.has(id)) jobs.set(id, read(`/api/v1/jobs/${part(id)}`));
+  jobs.get(id).then((job) => link.replaceChildren(`#${job.number} ${titled(job.procedure)}`)).catch(() => jobs.delete(id));
+  return link;
+}
+
+function count() { at("chosen").textContent = t("{n} chosen", { n: chosen.size }) + (chosen.size ? `: ${[...new Set([...chosen.values()].map((one) => `${one.unit} ${nameOf(one)}`))].slice(0, 3).join(", ")}${chosen.size > 3 ? ", …" : ""}` : ""); }
 
 function row(one) {
-  const name = one.station ? `${one.station.index}: ${one.station.label}` : ((one.source.files || [])[0] || {}).name || one.id;
-  const box = h("input", { type: "checkbox", checked: chosen.has(one.id), "aria-label": t("Choose {name}", { name }) });
+  const name = nameOf(one);
+  const box = h("input", { type: "checkbox", "data-recording": one.id, checked: chosen.has(one.id), "aria-label": t("Choose {name}", { name }) });
   box.addEventListener("change", () => { if (box.checked) chosen.set(one.id, one); else chosen.delete(one.id); count(); });
-  return h("tr", {}, h("td", {}, box), h("td", {}, h("a", { href: `/recordings/${one.id}` }, name)), h("td", {}, h("a", { href: `/units/${part(one.unit)}` }, one.unit)), h("td", {}, one.job ? h("a", { href: `/jobs/${one.job}` }, t("job")) : t("imported")),
+  return h("tr", {}, h("td", {}, box), h("td", {}, h("a", { href: `/recordings/${one.id}` }, name)), h("td", {}, h("a", { href: `/units/${part(one.unit)}` }, one.unit)), h("td", {}, one.job ? jobOf(one.job) : t("imported")),
     h("td", { class: "n" }, `${number(one.rate_hz)} Hz`), h("td", { class: "n" }, span(one.duration_s)), h("td", { class: "n" }, bytes(one.stored_bytes)), h("td", {}, moment(one.created_at)), h("td", {}, one.warnings.join(" ")));
 }
 
@@ -34,6 +46,19 @@ async function find(after = null) {
   body.append(...page.items.map(row));
   next = page.next;
   at("older").hidden = !next;
+}
+
+/** Chooses recordings that the address names, as another page has asked for; one that the list does not show is put first. */
+async function choseBefore(ids) {
+  for (const id of ids) {
+    const one = await read(`/api/v1/recordings/${part(id)}`).catch(() => null);
+    if (!one) continue;
+    chosen.set(id, one);
+    const shownAlready = body && body.querySelector(`input[data-recording="${CSS.escape(id)}"]`);
+    if (shownAlready) shownAlready.checked = true;
+    else if (body) body.prepend(row(one));
+  }
+  count();
 }
 
 function choose(name) {
@@ -72,9 +97,10 @@ search.addEventListener("submit", (event) => { event.preventDefault(); find(); }
 at("older").addEventListener("click", () => find(next));
 at("method").addEventListener("change", () => choose(at("method").value));
 at("analyse").addEventListener("submit", analyse);
-for (const [name, value] of new URLSearchParams(location.search)) if (search.elements[name]) search.elements[name].value = value;
+const wanted = new URLSearchParams(location.search);
+for (const [name, value] of wanted) if (search.elements[name]) search.elements[name].value = value;
 count();
-find();
+find().then(() => choseBefore(wanted.getAll("recording")));
 read("/api/v1/methods").then((all) => {
   methods = all;
   batches.named(all);

@@ -1,14 +1,14 @@
 // Search over the whole history of jobs.
 import { part, read } from "./api.js";
 import { busy } from "./act.js";
-import { badge, h, moment } from "./dom.js";
+import { badge, h, moment, titled } from "./dom.js";
 import { t } from "./words.js";
 
 const form = document.getElementById("search"), found = document.getElementById("found"), older = document.getElementById("older");
 let next = null, body = null;
 
 export function jobRow(job) {
-  return h("tr", {}, h("td", {}, h("a", { href: job.page }, job.procedure)), h("td", {}, h("a", { href: `/units/${part(job.unit)}` }, job.unit)), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
+  return h("tr", {}, h("td", {}, h("a", { href: job.page, title: job.procedure }, titled(job.procedure))), h("td", {}, h("a", { href: `/units/${part(job.unit)}` }, job.unit)), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
     h("td", {}, moment(job.created_at)), h("td", {}, job.requested_by), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, `#${job.number}`)),
     h("td", {}, h("a", { href: `/start?from=${job.id}` }, t("again"))));
 }
@@ -44,7 +44,7 @@ form.addEventListener("submit", (event) => {
 });
 older.addEventListener("click", () => search(next));
 read("/api/v1/procedures").then((all) => {
-  form.elements.procedure.append(...all.map((one) => h("option", { value: one.name }, one.name)));
+  form.elements.procedure.append(...all.map((one) => h("option", { value: one.name }, t(one.title))));
   for (const [name, value] of new URLSearchParams(location.search)) if (form.elements[name]) form.elements[name].value = value;
   search();
 }).catch((error) => { form.querySelector("output").textContent = error.message; });

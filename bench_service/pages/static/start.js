@@ -3,41 +3,47 @@ import { part, read, send } from "./api.js";
 import { busy } from "./act.js";
 import { fill, h, span } from "./dom.js";
 import { SchemaForm } from "./form.js";
+import { onceAt } from "./once.js";
 import { showPreview } from "./preview.js";
 import { t } from "./words.js";
 
 const wanted = new URLSearchParams(location.search), at = (id) => document.getElementById(id);
-const SOON_MS = 250, VERIFY = "calibration_verification";
+const SOON_MS = 250, CALIBRATE = "calibration_12_orientations", VERIFY = "verification_9_orientations", BOTH = "calibrate_verify";
 let procedures = [], benches = [], chosen = null, form = null, key = crypto.randomUUID(), asking = null, timer = null, good = false;
 
 const unit = () => at("unit").value.trim(), bench = () => at("bench").value || undefined;
 
+/** Whether this plan can be started, and the reason beside the buttons where it cannot. */
+function ready(can, why = "") {
+  good = can;
+  for (const id of ["go", "go-both"]) if (at(id)) at(id).disabled = !can;
+  at("refusal").className = "refused";
+  at("refusal").textContent = why;
+}
+
 async function preview() {
   if (asking) asking.abort();
-  good = false;
-  at("go").disabled = true;
+  ready(false, unit() ? "" : t("Choose a unit."));
   if (!chosen || !unit()) return;
   asking = new AbortController();
   let parameters;
-  try { parameters = form.values(); } catch { return; }
+  try { parameters = form.values(); } catch { ready(false, t("See the marked fields.")); return; }
   try {
     const plan = await send(`/api/v1/procedures/${part(chosen.name)}/preview`, { unit: unit(), ...(bench() && { bench: bench() }), parameters }, { signal: asking.signal });
     form.resolvedAs(plan.parameters);
     showPreview(at("preview"), plan);
-    at("refusal").textContent = "";
-    good = !plan.violations.length;
-    at("go").disabled = !good;
+    ready(!plan.violations.length, plan.violations.length ? t("The plan goes beyond a limit of the bench.") : "");
   } catch (error) {
     if (error.name === "AbortError") return;
     const left = form.errors(error.problem && error.problem.errors);
-    at("refusal").textContent = left.length || !(error.problem && (error.problem.errors || []).length) ? error.message : t("See the marked fields.");
+    ready(false, left.length || !(error.problem && (error.problem.errors || []).length) ? error.message : t("See the marked fields."));
     fill(at("preview"), h("p", { class: "note" }, t("There is no preview of this plan.")));
   }
 }
 
 function changed() {
   key = crypto.randomUUID();
-  at("go").disabled = true;
+  ready(false);
   clearTimeout(timer);
   timer = setTimeout(preview, SOON_MS);
 }
@@ -50,18 +56,22 @@ function choose(procedure, parameters = null) {
   fill(at("form"), h("h2", {}, t(procedure.title)), form.element);
   at("plan").hidden = false;
   at("start").scrollIntoView({ block: "start" });
-  at("verify-too").hidden = procedure.name !== "calibration_12_orientations";
+  at("verify-too").hidden = procedure.name !== CALIBRATE;
   for (const field of form.fields) field.mark();
   preview();
 }
 
 async function howLong() {
+  const nowhere = at("nowhere");
+  nowhere.hidden = true;
   if (!unit()) return;
   const plans = procedures.map((one) => ({ procedure: one.name, unit: unit(), ...(bench() && { bench: bench() }) }));
   const { items } = await send("/api/v1/previews", { plans }).catch(() => ({ items: [] }));
+  const common = items.length > 1 && items.every(({ refusal }) => refusal && refusal.detail === items[0].refusal.detail);
+  if (common) { nowhere.hidden = false; nowhere.textContent = items[0].refusal.detail; }  // once, not on every card
   items.forEach(({ preview: plan, refusal }, k) => {
     const place = document.querySelector(`#cards [data-procedure="${plans[k].procedure}"] .long`);
-    if (place) place.textContent = refusal ? refusal.detail : `${span(plan.duration_s)}, ${t("{n} stations", { n: plan.stations.length })}`;
+    if (place) place.textContent = common ? "" : refusal ? refusal.detail : `${span(plan.duration_s)}, ${t("{n} stations", { n: plan.stations.length })}`;
   });
 }
 
@@ -80,20 +90,14 @@ async function go() {
   if (job) location.href = job.page;
 }
 
-async function plan(name, title, steps) {
-  const campaign = { name, title, steps };
-  await send("/api/v1/campaigns", campaign).catch((error) => { if (error.status !== 409) throw error; });
-  return send(`/api/v1/campaigns/${part(name)}/runs`, { unit: unit(), ...(bench() && { bench: bench() }) }, { key });
+async function calibrateThenVerify() {  // a campaign of the service: nothing is stored before the run is accepted
+  const parameters = form.values(), { seed, labels } = extras();
+  const body = { unit: unit(), ...(bench() && { bench: bench() }), ...(Object.keys(parameters).length && { parameters: { calibrate: parameters } }), seed, labels };
+  const later = new FormData(at("terms")).get("not_before");
+  if (later && (body.parameters || seed !== undefined)) { at("refusal").textContent = t("A start at a time takes the default parameters and draws its seed: keep this plan as a campaign, then schedule that."); return; }
+  const run = await busy(at("go-both"), at("refusal"), () => later ? send("/api/v1/schedules", { campaign: BOTH, unit: body.unit, bench: body.bench, labels, ...onceAt(later) }, { key }) : send(`/api/v1/campaigns/${BOTH}/runs`, body, { key }));
+  if (run) location.href = later ? "/campaigns#schedules" : `/campaign-runs/${run.id}`;
 }
-
-async function calibrateThenVerify() {
-  const parameters = form.values(), own = Object.keys(parameters).length ? `-${Date.now().toString(36)}` : "";
-  const run = await busy(at("go-both"), at("refusal"), () => plan(`calibrate-verify${own}`, t("Calibrate, then verify"), [
-    { name: "calibrate", procedure: chosen.name, parameters }, { name: "verify", procedure: verifier().name }]));
-  if (run) location.href = `/campaign-runs/${run.id}`;
-}
-
-const verifier = () => procedures.find((one) => one.name === VERIFY || /verif/.test(one.name));
 
 async function keep() {
   const name = at("plan-name").value.trim();
@@ -114,7 +118,7 @@ async function begin() {
     h("strong", {}, t(procedure.title)), h("span", {}, t(procedure.result.description || "").split("\n")[0]), h("span", { class: "note long" })))));
   const name = (from && from.procedure) || wanted.get("procedure"), first = procedures.find((one) => one.name === name);
   if (first) choose(first, from && from.requested_parameters);
-  if (verifier() === undefined) at("verify-too").remove();
+  if (!procedures.some((one) => one.name === VERIFY)) at("verify-too").replaceChildren();
   howLong();
 }
 
@@ -122,4 +126,4 @@ for (const id of ["unit", "bench"]) at(id).addEventListener("change", () => { se
 at("start").addEventListener("submit", (event) => { event.preventDefault(); if (good) go(); });
 at("go-both").addEventListener("click", calibrateThenVerify);
 at("keep").addEventListener("click", keep);
-begin().catch((error) => { at("refusal").className = "refused"; at("refusal").textContent = error.message; });
+begin().catch((error) => { at("nowhere").hidden = false; at("nowhere").textContent = error.message; });

@@ -29,7 +29,7 @@ LAST_ADMIN = "this is the last admin: nobody could keep accounts after that. Mak
 
 
 class SqlAccessStore:
-    """SQL implementation of `bench_service.access.stores.AccessStore`."""
+    """SQL implementation of `bench_service.access.stores.AccessStore`, on SQLite and Postgres."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -7,12 +7,16 @@ from bench_service.persistence.archive.places import place_at
 
 
 def chunk_name(recording_id: str, number: int) -> str:
-    """Name of a chunk's file in the dataset; readers of such datasets take the recording's id from the folder."""
+    """Return the name of a chunk's file in the dataset; readers of such datasets take the recording's id from the
+    folder.
+    """
     return f"samples/recording={recording_id}/chunk-{number:06d}.parquet"
 
 
 def archived_chunk(place: str, recording_id: str, number: int, sha256: str) -> bytes:
-    """Read a chunk from the archive. Raises `ArchiveAway`, and `DamagedRecording` where its bytes are others."""
+    """Return the bytes of a chunk from the archive. Raises `ArchiveAway`, and `DamagedRecording` where they do not
+    match the hash.
+    """
     name = chunk_name(recording_id, number)
     payload = place_at(place).read(name)
     if hashlib.sha256(payload).hexdigest() != sha256:

@@ -57,7 +57,9 @@ Rows = list[dict[str, Any]]
 
 
 class ParquetArchive:
-    """Implementation of `bench_service.evidence.raw_data.store.Archive` over one address."""
+    """Archive as a Parquet dataset in a folder or an S3-compatible store. Implements
+    `bench_service.evidence.raw_data.store.Archive`.
+    """
 
     def __init__(self, database: Database, address: str) -> None:
         self._database = database

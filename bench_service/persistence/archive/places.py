@@ -28,7 +28,7 @@ class Place:
         return self._files.type_name == "local"
 
     def read(self, name: str) -> bytes:
-        """Read a file whole. Raises `ArchiveAway`."""
+        """Return the content of a file. Raises `ArchiveAway`, also where there is no such file."""
         with _away(f"{self.address}: {name}"), self._files.open_input_stream(self._path(name)) as stream:
             return stream.read()
 
@@ -42,7 +42,9 @@ class Place:
                 stream.write(content)
 
     def names(self, folder: str) -> list[str]:
-        """Names of the files directly in a folder, in order; none without such a folder. Raises `ArchiveAway`."""
+        """Return the names of the files directly in a folder, in order; none without such a folder. Raises
+        `ArchiveAway`.
+        """
         from pyarrow.fs import FileSelector, FileType
 
         with _away(f"{self.address}: {folder}"):
@@ -50,7 +52,7 @@ class Place:
             return sorted(info.base_name for info in found if info.type == FileType.File)
 
     def remove(self, name: str) -> None:
-        """Remove a file. Raises `ArchiveAway`."""
+        """Remove a file. Raises `ArchiveAway`, also where there is no such file."""
         with _away(f"{self.address}: {name}"):
             self._files.delete_file(self._path(name))
 
@@ -60,7 +62,7 @@ class Place:
 
 @cache
 def place_at(address: str) -> Place:
-    """The place at an address; it is opened once in a process. Raises `ArchiveAway`."""
+    """Return the place at an address; it is opened once in a process. Raises `ArchiveAway`."""
     return Place(address)
 
 

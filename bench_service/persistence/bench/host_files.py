@@ -9,12 +9,14 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
-from bench_service.bench.processes import Driving, ProcessIdentity
+from bench_service.bench.processes import Driving, ProcessIdentity, living
 from bench_service.model.errors import BenchBusy
 
 
 class HostFiles:
-    """Marks this process as driver or supervisor of a bench, and implements `bench_service.bench.processes.Watch`."""
+    """Files that mark this process as driver or supervisor of a bench on this host. Implements
+    `bench_service.bench.processes.Watch`.
+    """
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self._bench_id = bench_id
@@ -22,7 +24,7 @@ class HostFiles:
         self._supervisor = folder / f"bench-{bench_id}.supervisor"
 
     def driving(self) -> Driving | None:
-        """Return the process that drives, or last drove, the bench from this host."""
+        """Return the process that drives, or last drove, the bench from this host; None where none ever did."""
         try:
             document = json.loads(self._driver.read_text(encoding="utf-8"))
             return Driving(ProcessIdentity(**document["process"]), document["ended"])
@@ -30,12 +32,23 @@ class HostFiles:
             return None
 
     def begin_driving(self) -> None:
-        """Record that this process drives the bench. Its lease must be held."""
+        """Write into the file that this process drives the bench. Its lease must be held.
+
+        Raises `BenchBusy` where another living process does: by another database, or one that lost its lease and has
+        not noticed. The supervisor watches one process, and would not see the end of the other.
+        """
         self._driver.parent.mkdir(parents=True, exist_ok=True)
+        other = living(self.driving())
+        if other is not None and other != ProcessIdentity.own():
+            raise BenchBusy(
+                f"bench {self._bench_id!r} is driven from the folder {self._driver.parent.absolute()} by {other}, "
+                "though this database has no process that drives it: end that one, or give this one another "
+                "BENCH_DEVICE_FOLDER or BENCH_ID"
+            )
         self._write(False)
 
     def end_driving(self) -> None:
-        """Record that this process has ended in order. Its lease must still be held."""
+        """Write into the file that this process has ended in order. Its lease must still be held."""
         self._write(True)
 
     def supervisor(self) -> ProcessIdentity | None:
@@ -47,7 +60,7 @@ class HostFiles:
         return process if process.alive() else None
 
     def supervise(self) -> "SupervisorLock":
-        """Become the bench's supervisor on this host. Raises `BenchBusy` where there is one."""
+        """Become the bench's supervisor on this host, and return that right. Raises `BenchBusy` where there is one."""
         self._supervisor.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(self._supervisor, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
@@ -69,13 +82,15 @@ class HostFiles:
 
 
 class SupervisorLock:
-    """The right to be a bench's supervisor, for a process's life."""
+    """The right to be a bench's supervisor, for a process's life: an exclusive lock on a file that holds its
+    identity.
+    """
 
     def __init__(self, file: int) -> None:
         self._file: int | None = file
 
     def release(self) -> None:
-        """A second time does nothing."""
+        """Empty and unlock the file; a second call does nothing."""
         if self._file is not None:
             os.ftruncate(self._file, 0)
             os.close(self._file)

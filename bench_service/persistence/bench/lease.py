@@ -33,7 +33,9 @@ _SERVER_LOOKS = "-c tcp_keepalives_idle=5 -c tcp_keepalives_interval=2 -c tcp_ke
 
 
 class BenchLease(ABC):
-    """Lease of a bench, held for the life of a process, with a check that it is still held."""
+    """Lease of a bench, held for the life of a process, with a check that it is still held. Base of the leases on
+    SQLite and Postgres.
+    """
 
     def __init__(self, bench_id: str, role: str) -> None:
         """Take the lease of the bench. Raises `BenchBusy`."""
@@ -50,7 +52,7 @@ class BenchLease(ABC):
             return self._right is not None and self._is_ours(self._right)
 
     def regain(self) -> bool:
-        """Take the bench again after the lease was lost; False where another process was first, or on a failure."""
+        """Take the lease again after it was lost; return False where another process was first, or on a failure."""
         with self._mutex:
             self._drop()
             if self._given_back:  # a thread that looks once more while the process ends
@@ -117,7 +119,9 @@ def _written_holder(file: int) -> str:
 
 
 class FileLease(BenchLease):
-    """Lease by a locked file, with the holder's process id in it."""
+    """Lease on SQLite: an exclusive `flock` on a file beside the database, which holds the role and process id of the
+    holder. The constructor takes it and raises `BenchBusy`.
+    """
 
     def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -160,7 +164,9 @@ class FileLease(BenchLease):
 
 
 class ServerLease(BenchLease):
-    """Lease by an advisory lock of a connection of its own."""
+    """Lease on Postgres: an advisory lock, held by a connection that is used for nothing else. The constructor takes it
+    and raises `BenchBusy`.
+    """
 
     def __init__(self, url: URL, bench_id: str, role: str) -> None:
         self._key = lease_key(bench_id)
@@ -235,7 +241,7 @@ def _busy(bench_id: str, who: str | None) -> BenchBusy:
 
 
 def lease_key(bench_id: str) -> int:
-    """Compute the key of a bench's advisory lock."""
+    """Return the number of a bench's advisory lock on Postgres, from a hash of the bench's id."""
     return int.from_bytes(hashlib.sha256(f"bench lease {bench_id}".encode()).digest()[:8], "big", signed=True)
 
 

@@ -1,4 +1,4 @@
-"""Questions to the person at the bench, and their answers, in the jobs' own rows."""
+"""Requests to the person at the bench, and their answers, in the jobs' own rows."""
 
 from datetime import datetime
 

@@ -122,7 +122,7 @@ class SqlBenchRegistry:
 
 
 def standing_stops(session: Session, bench_id: str, limit: int | None = None) -> tuple[BenchStop, ...]:
-    """Read the stops of a bench that stand, oldest first."""
+    """Return at most `limit` standing stops of a bench, oldest first."""
     query = select(BenchStopRow).where(BenchStopRow.bench == bench_id, _STANDS)
     ordered = query.order_by(BenchStopRow.at, BenchStopRow.id).limit(limit)
     return tuple(map(_stop_of_row, session.scalars(ordered)))

@@ -25,7 +25,7 @@ from bench_service.telemetry.audit import AuditEntry
 
 
 class SqlSafetyBooks:
-    """SQL implementation of `bench_service.bench.supervisor.SafetyBooks` for one bench."""
+    """SQL implementation of `bench_service.bench.supervisor_ports.SafetyBooks` for one bench."""
 
     def __init__(self, database_url: str, bench_id: str) -> None:
         self._url = database_url
@@ -82,7 +82,7 @@ class SqlSafetyBooks:
             return session.scalar(query) is not None
 
     def close(self) -> None:
-        """Close the database's connections."""
+        """Close the database's connections, if any were opened."""
         opened, self._opened = self._opened, None
         if opened is not None:
             opened.dispose()

@@ -13,7 +13,7 @@ KEY = "stops_taken_at"
 
 
 class SqlStopAddresses:
-    """Addresses written by supervisors and read by every API process."""
+    """SQL store of the addresses where supervisors take stops: written by supervisors and read by every API process."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

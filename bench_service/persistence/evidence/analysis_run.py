@@ -11,7 +11,9 @@ from bench_service.persistence import open_stores
 
 
 def open_run(database_url: str, code_version: str) -> Run:
-    """Prepare an analysis process, see `WorkProcesses`: "method" and "again" give a result's id, the others JSON."""
+    """Return the function that an analysis process runs, see `WorkProcesses`: "method" and "again" give a result's id,
+    the others JSON.
+    """
     from threadpoolctl import threadpool_limits
 
     from bench_service.evidence.so_far.estimating import Estimating

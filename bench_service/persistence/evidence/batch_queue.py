@@ -22,7 +22,7 @@ WAITING, RUNNING = TaskState.WAITING.value, TaskState.RUNNING.value
 
 
 class SqlBatchQueue:
-    """The part of `bench_service.evidence.batches.store.BatchStore` that workers use."""
+    """SQL implementation of the part of `bench_service.evidence.batches.store.BatchStore` that workers use."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

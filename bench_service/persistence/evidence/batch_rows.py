@@ -35,7 +35,7 @@ def _batch(row: BatchRow, live: Mapping[TaskState, int]) -> AnalysisBatch:
 
 
 def found_batch(session: Session, batch_id: str, *, lock: bool = False) -> BatchRow:
-    """Return the row of a batch. Raises `NotFound`."""
+    """Return the row of a batch, locked for this transaction where `lock` is true. Raises `NotFound`."""
     query = select(BatchRow).where(BatchRow.id == batch_id)
     row = session.scalar(query.with_for_update() if lock else query)
     if row is None:
@@ -44,7 +44,7 @@ def found_batch(session: Session, batch_id: str, *, lock: bool = False) -> Batch
 
 
 def recordings_of_tasks(session: Session, batch_id: str, numbers: Sequence[int]) -> dict[int, tuple[str, ...]]:
-    """Ids of the recordings of some tasks of a batch, each in the order of their positions."""
+    """Return, by the number of a task, the ids of its recordings in the order of their positions."""
     query = (
         select(TaskRecordingRow.number, TaskRecordingRow.recording_id)
         .where(TaskRecordingRow.batch_id == batch_id, TaskRecordingRow.number.in_(numbers))

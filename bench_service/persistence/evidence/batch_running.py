@@ -19,12 +19,16 @@ TAKEN, COMPUTED = "taken ", "computed "
 
 
 def cores_left() -> int:
-    """Number of processes of one machine that also drives a bench: all cores but one, at least one."""
+    """Return the number of analysis processes on a machine that also drives a bench: all cores but one, at least
+    one.
+    """
     return max(1, len(os.sched_getaffinity(0)) - 1)
 
 
 def open_batch_run(database_url: str, code_version: str) -> Run:
-    """Prepare a process for tasks of batches, see `WorkProcesses`: its one verb is `run_or_take`."""
+    """Return the function that a process for tasks of batches runs, see `WorkProcesses`: its one verb is
+    `run_or_take`.
+    """
     from threadpoolctl import threadpool_limits
 
     from bench_service.persistence.stores import open_stores
@@ -76,7 +80,9 @@ def runner_here(
 def runner_maker(
     database: Database, database_url: str, code_version: str, closing: ExitStack, apart: bool
 ) -> RunnerMaker | None:
-    """Choose the runner of a service; None on Postgres, where workers run the tasks (`bench worker --analyse`)."""
+    """Return the function that builds the runner of a service; None on Postgres, where workers run the tasks (`bench
+    worker --analyse`).
+    """
     if database.is_postgres:
         return None
     if apart:

@@ -117,7 +117,9 @@ def _value(row: CalibrationRow, coefficients: Sequence[CoefficientRow]) -> Triad
 def without_coefficients(
     document: Mapping[str, Any], calibrations: Sequence[TriadCalibration]
 ) -> tuple[dict[str, Any], frozenset[str]]:
-    """The document to store, with null for what the calibrations have; and the names of those estimates."""
+    """Return the document to store, with null for the numbers that the calibrations have; and the names of those
+    estimates.
+    """
     if not calibrations:
         return dict(document), frozenset()
     whole = [TRIAD.dump_python(c, mode="json") for c in calibrations]
@@ -142,7 +144,7 @@ def without_coefficients(
 
 
 def with_coefficients(document: dict[str, Any], calibrations: Sequence[StoredCalibration]) -> dict[str, Any]:
-    """A stored document with the numbers of its result's calibrations in their places again."""
+    """Return a stored document with the numbers of its result's calibrations in their places again."""
     if not calibrations:
         return document
     whole = {c.triad: TRIAD.dump_python(c.value, mode="json") for c in calibrations}

@@ -20,7 +20,7 @@ from procedures.core.recording import RawArray
 
 @dataclass(frozen=True)
 class ChunkReader:
-    """The chunks of one recording; each is a short transaction of its own."""
+    """Reads the chunks of one recording; each is a short transaction of its own, and checked against its hash."""
 
     database: Database
     recording_id: str
@@ -32,7 +32,9 @@ class ChunkReader:
         return _reopened, (url, self.recording_id, self.chunk_rows)
 
     def blocks(self, names: Sequence[str], start: int, stop: int) -> Iterator[RawArray]:
-        """Samples start…stop (half open) of the named channels. Raises `DamagedRecording`, naming the chunk."""
+        """Yield samples start…stop (half open) of the named channels, a chunk at a time, in shape (n, channels). Raises
+        `DamagedRecording`, naming the chunk.
+        """
         if stop <= start:
             return
         for number in range(start // self.chunk_rows, (stop - 1) // self.chunk_rows + 1):

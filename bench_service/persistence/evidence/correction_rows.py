@@ -1,7 +1,7 @@
 """Conversion of corrections to rows and back, and their place in a unit's history. No transaction begins here."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, select, update
@@ -13,19 +13,30 @@ from bench_service.mapping import copied
 from bench_service.model.calibrations import Act, Approval, Decision
 from bench_service.model.errors import NotFound
 from bench_service.model.records import StoredResult
-from bench_service.persistence.tables.evidence import CorrectionDecisionRow, CorrectionRow, ResultCorrectionRow
+from bench_service.persistence.tables.evidence import (
+    CorrectionDecisionRow,
+    CorrectionRow,
+    ResultCorrectionRow,
+    ResultRow,
+)
+from bench_service.persistence.tables.jobs import JobRow
+from procedures.core.limits import Verdict
 from procedures.core.unit_correction import UnitCorrection
 
 CORRECTION = TypeAdapter(UnitCorrection)
 
 
-def correction_of_row(row: CorrectionRow, decisions: Sequence[CorrectionDecisionRow] = ()) -> StoredCorrection:
-    """Convert a row with its decisions, oldest first, to its correction."""
+def correction_of_row(
+    row: CorrectionRow, verdict: str, of_job: bool, decisions: Sequence[CorrectionDecisionRow] = ()
+) -> StoredCorrection:
+    """Convert a row with its result's verdict and its decisions, oldest first, to a stored correction."""
     return copied(
         StoredCorrection,
         row,
         current=row.is_current,
         correction=CORRECTION.validate_python(row.document),
+        verdict=Verdict(verdict),
+        of_job=of_job,
         approval=Approval(row.approval),
         decisions=tuple(copied(Decision, d, calibration_id=d.correction_id, act=Act(d.act)) for d in decisions),
     )
@@ -34,14 +45,24 @@ def correction_of_row(row: CorrectionRow, decisions: Sequence[CorrectionDecision
 def corrections_where(
     session: Session, *conditions: ColumnElement[bool] | InstrumentedAttribute[bool]
 ) -> list[StoredCorrection]:
-    """Corrections under some conditions with their decisions, oldest first."""
+    """Return the corrections that meet all conditions, with their decisions, oldest first."""
     rows = session.scalars(select(CorrectionRow).where(*conditions).order_by(CorrectionRow.id)).all()
     decisions: dict[str, list[CorrectionDecisionRow]] = defaultdict(list)
     if rows:
         of = CorrectionDecisionRow.correction_id.in_([row.id for row in rows])
         for decision in session.scalars(select(CorrectionDecisionRow).where(of).order_by(CorrectionDecisionRow.id)):
             decisions[decision.correction_id].append(decision)
-    return [correction_of_row(row, decisions[row.id]) for row in rows]
+    verdicts = _verdicts(session, {row.result_id for row in rows})
+    return [correction_of_row(row, *verdicts[row.result_id], decisions[row.id]) for row in rows]
+
+
+def _verdicts(session: Session, results: Collection[str]) -> dict[str, tuple[str, bool]]:
+    """Verdict of each result, and whether it is its job's own one."""
+    if not results:
+        return {}
+    own = select(JobRow.result_id).where(JobRow.id == ResultRow.job_id, JobRow.result_id == ResultRow.id).exists()
+    query = select(ResultRow.id, ResultRow.verdict, own).where(ResultRow.id.in_(results))
+    return {result: (verdict, of_job) for result, verdict, of_job in session.execute(query)}
 
 
 def check_corrections(session: Session, result: StoredResult) -> None:
@@ -52,7 +73,7 @@ def check_corrections(session: Session, result: StoredResult) -> None:
 
 
 def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
-    """Build the rows that link a result to the corrections that it used."""
+    """Return new rows that link a result to the corrections that it used."""
     return [
         ResultCorrectionRow(result_id=result.id, position=position, correction_id=correction_id)
         for position, correction_id in enumerate(result.corrections)
@@ -60,7 +81,7 @@ def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
 
 
 def retire_current(session: Session, unit: str | None, kind: str) -> None:
-    """Unset the unit's current correction of that kind."""
+    """Make the unit's current correction of that kind no longer current, in this transaction."""
     session.execute(
         update(CorrectionRow)
         .where(CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current)
@@ -69,10 +90,20 @@ def retire_current(session: Session, unit: str | None, kind: str) -> None:
 
 
 def add_corrections(
-    session: Session, result: StoredResult, corrections: Sequence[UnitCorrection], make_current: bool
+    session: Session, result: StoredResult, corrections: Sequence[UnitCorrection], by_rule: bool
 ) -> None:
-    """Add to a unit's history; of two that become current at once, the index lets one wait and the store try again."""
+    """Add a result's corrections to the unit's history; by the rule they become current where the result passed.
+
+    A person's usable choice stands. `by_rule`: False for a second analysis or a method, whose corrections become
+    current only when a person chooses them. Of two that become current at once, the index lets one wait and the store
+    try again.
+    """
+    if not corrections:
+        return
+    known = corrections_where(session, CorrectionRow.unit == result.unit, CorrectionRow.is_current)
+    standing = {c.correction.kind for c in known if not c.gives_way(wall_clock.now())}
     for correction in corrections:
+        make_current = by_rule and result.verdict is Verdict.PASS and correction.kind not in standing
         if make_current:
             retire_current(session, result.unit, correction.kind)
         session.add(

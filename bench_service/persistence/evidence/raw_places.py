@@ -20,10 +20,10 @@ def require_raw(row: RecordingRow) -> None:
 
 
 def payload_elsewhere(database: Database, recording_id: str, number: int, sha256: str) -> bytes:
-    """Bytes of a chunk that is empty in the database, from the archive and checked.
+    """Return the bytes of a chunk that is empty in the database, from the archive and checked against its hash.
 
-    It is looked up now, not when the reader was opened: the data may have moved meanwhile. Raises `RawDataRemoved`,
-    `ArchiveAway`, `DamagedRecording`.
+    The place is looked up now, not when the reader was opened: the data may have moved meanwhile. Raises
+    `RawDataRemoved`, `ArchiveAway`, `DamagedRecording`.
     """
     with database.read() as session:
         row = session.scalar(select(RecordingRow).where(RecordingRow.id == recording_id))

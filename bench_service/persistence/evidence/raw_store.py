@@ -1,4 +1,4 @@
-"""The places of raw data in SQL: what is old enough, what wants it, and the moves of its chunks.
+"""The places of raw data in SQL: which recordings are old enough, what needs them, and the moves of their chunks.
 
 A move begins with one transaction that decides (`removing`, `archiving`, `restoring`), goes over the chunks a few at a
 time, so that it keeps no writer waiting, and ends with one that says so. A crash in between leaves the first word, by

@@ -20,9 +20,9 @@ _OPEN = (TaskState.WAITING.value, TaskState.RUNNING.value)
 
 
 def wanted_by_calibrations(session: Session) -> frozenset[str]:
-    """Recordings of the results behind every calibration and correction that is current or approved.
+    """Return the ids of recordings behind every calibration and correction that is current or approved.
 
-    A result may rest on other calibrations and corrections; so theirs are wanted too.
+    A result may rest on other calibrations and corrections; so theirs are included.
     """
     approved = Approval.APPROVED.value
     found: set[str] = set()
@@ -59,7 +59,7 @@ def wanted_by_calibrations(session: Session) -> frozenset[str]:
 
 
 def wanted_by_holds(session: Session, recording_id: str | None = None) -> frozenset[str]:
-    """Recordings with a standing hold, or the one that is asked for."""
+    """Return the ids of recordings with a standing hold; with `recording_id` at most that one."""
     query = select(HoldRow.recording_id).where(HoldRow.released_at.is_(None))
     if recording_id is not None:
         query = query.where(HoldRow.recording_id == recording_id)
@@ -67,7 +67,7 @@ def wanted_by_holds(session: Session, recording_id: str | None = None) -> frozen
 
 
 def wanted_by_analyses(session: Session, recording_id: str | None = None) -> frozenset[str]:
-    """Recordings that a waiting or running task needs, of all recordings or of one."""
+    """Return the ids of recordings that a waiting or running task needs; with `recording_id` at most that one."""
     query = (
         select(TaskRecordingRow.recording_id)
         .join(TaskRow, (TaskRow.batch_id == TaskRecordingRow.batch_id) & (TaskRow.number == TaskRecordingRow.number))

@@ -18,7 +18,7 @@ MEASURED = TypeAdapter(Measured)
 
 
 def station_of_row(row: RecordingRow) -> Station | None:
-    """Read the station of a recording from its row."""
+    """Return the station of a recording from its row; None for a recording without one."""
     return None if row.station is None else STATION.validate_python(row.station)
 
 
@@ -41,7 +41,7 @@ def stored_of_row(row: RecordingRow) -> StoredRecording:
 
 
 def row_of_new(new: NewRecording, recording_id: str, created_at: datetime, chunk_rows: int) -> RecordingRow:
-    """Build the row of a recording before its first sample."""
+    """Return the row of a recording before its first sample."""
     return copied(
         RecordingRow,
         new,

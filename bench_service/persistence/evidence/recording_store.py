@@ -42,7 +42,7 @@ _OF_JOB = (
 
 @dataclass(frozen=True)
 class StoredSamples:
-    """`procedures.core.recording.Recording` over the database: each pass reads the chunks again."""
+    """Implementation of `procedures.core.recording.Recording` over the database: each pass reads the chunks again."""
 
     info: RecordingInfo
     _reader: ChunkReader
@@ -57,7 +57,7 @@ class StoredSamples:
 
 
 class SqlRecordingStore:
-    """SQL implementation of `bench_service.jobs.stores.RecordingStore`."""
+    """SQL implementation of `bench_service.evidence.recordings.RecordingStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -103,7 +103,7 @@ class SqlRecordingStore:
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
     ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
-        """Read samples, see the port; `start` and `stop` beyond the ends are taken as the ends."""
+        """Yield samples, see `RecordingStore.read`; `start` and `stop` beyond the ends are taken as the ends."""
         with self._database.read() as session:
             row = _found(session, recording_id)
             require_raw(row)

@@ -40,7 +40,9 @@ log = logging.getLogger(__name__)
 
 
 class SqlRecordingWriter:
-    """SQL implementation of `bench_service.jobs.stores.RecordingWriter`. It holds two chunks in memory at most."""
+    """SQL implementation of `bench_service.evidence.recordings.RecordingWriter`. It holds two chunks in memory at
+    most.
+    """
 
     def __init__(self, database: Database, new: NewRecording) -> None:
         _check(new)

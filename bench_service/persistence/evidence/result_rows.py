@@ -28,7 +28,7 @@ def quantity_rows(result: StoredResult, elsewhere: frozenset[str]) -> list[Resul
 
 
 def lineage_rows(result: StoredResult) -> tuple[ResultRecordingRow | ResultCalibrationRow, ...]:
-    """Build the rows of a result's lineage."""
+    """Return the rows of a result's lineage: its recordings with hashes, and its calibrations, by position."""
     recordings = (
         ResultRecordingRow(result_id=result.id, position=position, recording_id=recording_id, content_hash=digest)
         for position, (recording_id, digest) in enumerate(result.recordings)

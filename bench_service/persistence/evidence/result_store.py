@@ -51,7 +51,7 @@ from procedures.core.unit_correction import UnitCorrection
 
 
 class SqlResultStore:
-    """SQL implementation of `bench_service.jobs.stores.ResultStore`."""
+    """SQL implementation of `bench_service.evidence.results.ResultStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -88,7 +88,7 @@ class SqlResultStore:
                 session.flush()
                 if (
                     content is not None and same is None
-                ):  # a rival with the same content waits here, and then finds this result
+                ):  # a transaction with the same content waits here, and then finds this result
                     session.add(ResultContentRow(content=content, result_id=result.id))
                     session.flush()
                 session.add_all([*quantity_rows(result, taken), *lineage_rows(result), *correction_lineage(result)])

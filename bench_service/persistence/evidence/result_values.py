@@ -35,7 +35,7 @@ ABOUT = (
 
 @dataclass(frozen=True)
 class VerdictResults:
-    """The results that gave jobs of a unit their verdict; no repeated analyses."""
+    """Queries of the results that gave jobs of a unit their verdict; no repeated analyses."""
 
     unit: str
     procedure: str
@@ -44,7 +44,7 @@ class VerdictResults:
     def newest_first(
         self, session: Session, query: Select[*tuple[Any, ...]], before: str | None = None, at_once: int = AT_ONCE
     ) -> Iterator[Row[*tuple[Any, ...]]]:
-        """All rows of a query of them, from the newest id on, or from the newest one older than `before`.
+        """Yield the rows of a query of such results, from the newest id on, or from the newest one older than `before`.
 
         Ids come first, by an index alone: with the join in one statement Postgres expects a single row, and sorts all.
         """

@@ -16,7 +16,7 @@ from bench_service.persistence.evidence.calibration_rows import calibrations_whe
 from bench_service.persistence.evidence.correction_rows import corrections_where
 from bench_service.persistence.idempotency import again_after_conflict
 from bench_service.persistence.tables.evidence import CalibrationRow, CorrectionRow, UnitRow
-from procedures.core.unit import Unit, WithheldCalibration
+from procedures.core.unit import Unit, Withheld
 
 UNIT = TypeAdapter(Unit)
 _JOINED = {
@@ -87,7 +87,7 @@ def _unit(
     joined: dict[str, Any] = {
         "calibrations": tuple(c.value for c in usable),
         "calibration_ids": tuple(c.id for c in usable),
-        "withheld": tuple(WithheldCalibration(s, c.id, doubts[c.id]) for s, c in subjects if doubts[c.id]),
+        "withheld": tuple(Withheld(s, c.id, doubts[c.id]) for s, c in subjects if doubts[c.id]),
         "thermal_correction": thermal and thermal.correction.thermal,
         "thermal_correction_id": thermal and thermal.id,
         "converter": converter and converter.correction.converter,

@@ -16,7 +16,7 @@ MOST = 1000
 
 @dataclass(frozen=True)
 class LeasedName:
-    """A name that this process holds."""
+    """A worker's name that this process holds, with its lease. Implements `WorkerName`."""
 
     name: str
     lease: BenchLease
@@ -26,12 +26,14 @@ class LeasedName:
         return self.lease.held()
 
     def release(self) -> None:
-        """Give the name back."""
+        """Release the lease of the name; another process may take it."""
         self.lease.release()
 
 
 class SqlWorkerNames:
-    """Implementation of `bench_service.evidence.batches.runner.WorkerNames`."""
+    """Names of workers by leases on SQLite or Postgres. Implements
+    `bench_service.evidence.batches.runner.WorkerNames`.
+    """
 
     def __init__(self, database: Database, database_url: str) -> None:
         self._database = database

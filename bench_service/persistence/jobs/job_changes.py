@@ -28,7 +28,7 @@ CLOCKS_DIFFER_S = 5.0
 
 
 def found_job(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
-    """Read the row of a job, locked for this transaction where asked. Raises `NotFound`."""
+    """Return the row of a job, locked for this transaction where `lock` is true. Raises `NotFound`."""
     row = session.scalar(_LOCKED_JOB if lock else _JOB, {"id": job_id})
     if row is None:
         raise NotFound("job", job_id)

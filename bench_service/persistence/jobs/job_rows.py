@@ -30,7 +30,9 @@ def row_of_job(job: Job) -> JobRow:
 
 
 def job_of_row(row: JobRow) -> Job:
-    """Convert a row to its job. Raises `NotUnderstood`."""
+    """Convert a row to its job. Raises `NotUnderstood` where another version wrote it in a form that this one cannot
+    read.
+    """
     try:
         return copied(
             Job,
@@ -58,5 +60,5 @@ def event_of_row(row: EventRow) -> Event:
 
 
 def failure_document(failure: Failure | None) -> dict[str, Any] | None:
-    """Convert the failure of a job to JSON."""
+    """Return the failure of a job as a JSON object; None for no failure."""
     return None if failure is None else FAILURE.dump_python(failure, mode="json")

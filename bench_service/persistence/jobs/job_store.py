@@ -46,7 +46,7 @@ class SqlJobStore:
                 remember(session, idempotency, "job", job.id, job.created_at)
                 numbered = replace(job, number=(session.scalar(select(func.max(JobRow.number))) or 0) + 1)
                 session.add(row_of_job(numbered))
-                session.flush()  # a rival that took the number first is a conflict: tried again with the next one
+                session.flush()  # a conflict where a concurrent transaction took the number: retried with the next one
                 session.add_all(JobLabelRow(job_id=job.id, name=k, value=v) for k, v in job.labels.items())
                 append_event(session, job.id, "state", job.created_at, {"state": job.state.value})
                 return numbered

@@ -162,7 +162,7 @@ class SqlManualStore:
 
 
 def open_lease(session: Session, bench: str) -> ManualLease | None:
-    """Read the lease of a bench that has not ended."""
+    """Return the lease of a bench that has not ended; None where there is none."""
     row = session.scalar(
         select(ManualLeaseRow).where(ManualLeaseRow.bench == bench, ManualLeaseRow.ended_at.is_(None)).limit(1)
     )

@@ -1,4 +1,4 @@
-"""Reservations of benches and units in SQL. Transactions for the same name take turns: one of two rivals gets it."""
+"""Reservations of benches and units in SQL. Of concurrent transactions for one name, one gets it."""
 
 from datetime import datetime
 from typing import Any
@@ -71,7 +71,7 @@ class SqlReservationStore:
 
 
 def active_reservations(session: Session, at: datetime) -> tuple[Reservation, ...]:
-    """Read every reservation that holds at a moment; few do, so all of them are read."""
+    """Return every reservation that holds at a moment; few do, so all of them are read."""
     found = (reservation_of_row(row) for row in session.scalars(_ACTIVE, {"at": at}))
     return tuple(reservation for reservation in found if reservation.active(at))
 

@@ -1,1 +1,1 @@
-"""SQL tables, divided like the ports of the stores; `every` imports all of them, for migrations."""
+"""SQL tables, one module for the stores of each package; `every` imports all of them, for migrations."""

@@ -9,7 +9,7 @@ from bench_service.persistence.tables.columns import Id, Table
 
 
 class AccessStateRow(Table):
-    """The one row that counts changes, with the key of the values against cross-site requests."""
+    """The single row that counts changes of access, with the key of the values against cross-site requests."""
 
     __tablename__ = "access_state"
 
@@ -49,7 +49,7 @@ class TokenRow(Table):
 
 
 class SessionRow(Table):
-    """A session that nobody has ended; it ends by itself by its times."""
+    """A person's session that nobody has ended; it expires by its times."""
 
     __tablename__ = "sessions"
     __table_args__ = (Index(None, "account"),)
@@ -71,7 +71,7 @@ class FailedLogInRow(Table):
 
 
 class ApprovalRow(Table):
-    """The version of a procedure that operators may run."""
+    """The version of a procedure that operators may run, with who approved it and when."""
 
     __tablename__ = "approvals"
 

@@ -64,7 +64,7 @@ class TaskRecordingRow(Table):
 
 
 class ResultContentRow(Table):
-    """The first result of a content: the digest of everything that an analysis of a method reads."""
+    """The first result of each content digest, over everything that an analysis of a method reads."""
 
     __tablename__ = "result_contents"
 

@@ -45,7 +45,7 @@ class BenchStopRow(Table):
 
 
 class BenchLiveRow(Table):
-    """Last live state that a bench's driver reported."""
+    """The last live state that a bench's driver reported, one row a bench."""
 
     __tablename__ = "bench_live"
 

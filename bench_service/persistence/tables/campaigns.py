@@ -10,7 +10,7 @@ from bench_service.persistence.tables.columns import Id, Table
 
 
 class CampaignRow(Table):
-    """A stored campaign as a document."""
+    """A stored campaign, as a JSON document with its team and times."""
 
     __tablename__ = "campaigns"
 
@@ -43,7 +43,7 @@ class CampaignRunRow(Table):
 
 
 class ScheduleRow(Table):
-    """A schedule by which a campaign starts."""
+    """A schedule by which a campaign starts, as a JSON document with its next start."""
 
     __tablename__ = "schedules"
 

@@ -10,7 +10,7 @@ from bench_service.persistence.tables.columns import Document, Id, Table
 
 
 class ManualLeaseRow(Table):
-    """A lease on a bench; at most one of a bench is open."""
+    """A lease of manual mode on a bench; at most one of a bench is open."""
 
     __tablename__ = "manual_leases"
     __table_args__ = (
@@ -43,7 +43,7 @@ class ManualLeaseRow(Table):
 
 
 class ManualDemandRow(Table):
-    """A demand of a lease."""
+    """A demand that was made under a lease of manual mode, with its state and answer."""
 
     __tablename__ = "manual_demands"
     __table_args__ = (UniqueConstraint("lease", "key"), Index(None, "lease", "id"))

@@ -24,7 +24,7 @@ STRETCH = 20_000
 
 
 class SqlAuditTrail:
-    """SQL implementation of `bench_service.telemetry.audit.AuditTrail`."""
+    """SQL implementation of `bench_service.telemetry.audit.AuditTrail`: rows are only added."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

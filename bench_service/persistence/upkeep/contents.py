@@ -20,13 +20,13 @@ FAULTS = 20
 
 
 class DatabaseContents:
-    """A `bench_service.telemetry.upkeep.DatabasePort` over one database."""
+    """Size and faults of one database. Implements `bench_service.telemetry.upkeep.DatabasePort`; reads only."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def size(self) -> DatabaseSize:
-        """Read size and revision of the database; for SQLite with the room on its disk. Raises `StorageFailure`."""
+        """Return size and revision of the database; for SQLite with the room on its disk. Raises `StorageFailure`."""
         database = self._database
         with database.read() as session:
             revision = revision_of(session.connection())
@@ -39,7 +39,9 @@ class DatabaseContents:
         return DatabaseSize("sqlite", _bytes(file), _bytes(file, "-wal"), database.free_bytes(), revision, reusable)
 
     def faults(self) -> tuple[str, ...]:
-        """Return what the database itself finds wrong; of Postgres only what reading every chunk shows afterwards."""
+        """Return what the database's own check finds wrong, a sentence each; on Postgres, which has none, an empty
+        tuple.
+        """
         if self._database.is_postgres:
             return ()
         self._database.require_file()
@@ -74,7 +76,7 @@ def _faults(file: sqlite3.Connection) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class CopyContents:
-    """The contents of a copy, as they were found in it."""
+    """Contents of a copy of the database, as the check found them: revision, rows, chunks, faults."""
 
     revision: str
     rows: dict[str, int]
@@ -83,7 +85,8 @@ class CopyContents:
 
 
 def check_copy(copy: Path) -> CopyContents:
-    """Check a copy as a whole: its integrity, its references, and every chunk against its hash.
+    """Check a copy as a whole, its integrity, its references, and every chunk against its hash, and return what was
+    found.
 
     Raises `StorageFailure` where it is not a copy of a database of this service.
     """

@@ -140,7 +140,7 @@ def empty_file(target: Path, revision: str) -> dict[str, set[str]]:
 
 
 def tables_of(connection: Connection, names: set[str]) -> list[Table]:
-    """Reflect tables of a database, those first that others refer to."""
+    """Return tables of a database as it describes them itself, those first that others refer to."""
     found = MetaData()
     found.reflect(connection, only=lambda name, _: name in names)
     return [table for table in found.sorted_tables if table.name in names]

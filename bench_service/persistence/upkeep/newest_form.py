@@ -37,7 +37,7 @@ def put_newest_form(connection: Connection, revision: str) -> bool:
 
 
 def newest_form_of(connection: Connection, revision: str) -> str:
-    """Write down an SQLite database that the migrations have just made: its tables, indexes and first rows, as SQL."""
+    """Return an SQLite database that the migrations have just made as SQL text: its tables, indexes and first rows."""
     parts = [str(sql) for (sql,) in connection.execute(text(_OBJECTS))]
     for (table,) in connection.execute(text(_TABLES)).all():
         rows = connection.execute(text(f'SELECT * FROM "{table}"')).all()

@@ -46,6 +46,10 @@ class ChannelResponse(Part):
     """Part of it by noise, and by stamps that scatter from recording to recording [s]"""
     delay_from_encoder_s: float
     """Part of it by the time of the encoder's readings [s]"""
+    delay_from_clock_s: float
+    """Part of it by the unit's clock, where that differs from the bench's: the delay is another at each moment of
+    a recording, from its begin to its end by ``drift·T``, and counts as a rectangle's ``drift·T/√12`` [s]
+    """
     delay_degrees_of_freedom: int | None
     """Degrees of freedom of the uncertainty where the stamps' scatter was estimated; None: so many that none
     counts.
@@ -79,7 +83,7 @@ class ChannelResponse(Part):
 
 
 class DynamicResponse(Part):
-    """Results of all channels."""
+    """Results of a dynamic response for all channels, with the scatter of the stamps and warnings."""
 
     channels: tuple[ChannelResponse, ...]
     """Channels, in order"""

@@ -7,7 +7,7 @@ from bench_client.results.shared import Check, Statement, Verdict
 
 
 class InnovationTest(Part):
-    """Test of one channel's innovations."""
+    """Test of one channel's innovations: their size and their whiteness."""
 
     mean_square: float
     """Mean normalised innovation squared; 1 is expected."""

@@ -193,7 +193,7 @@ class ScalarCheck(Part):
 
 
 class BudgetRow(Part):
-    """One source of uncertainty of one coefficient."""
+    """One source of uncertainty of one coefficient: value, distribution, divisor, sensitivity, contribution."""
 
     source: str
     """Source"""
@@ -214,7 +214,7 @@ class BudgetRow(Part):
 
 
 class Budget(Part):
-    """Uncertainty budget of one coefficient."""
+    """Uncertainty budget of one coefficient: rows by source, and the expanded uncertainty."""
 
     coefficient: str
     """Name of the coefficient, such as gyro.K11"""
@@ -235,7 +235,7 @@ class Budget(Part):
 
 
 class TriadSummary(Part):
-    """Complete calibration results of one triad."""
+    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets. JSON-ready."""
 
     calibration: TriadCalibration
     """Calibration of the triad"""

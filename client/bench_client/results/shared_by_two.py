@@ -36,7 +36,7 @@ class FerrarisCalibrationDocument(Part):
 
 
 class TermEstimate(Part):
-    """One coefficient with its standard uncertainty and the decision whether it is there."""
+    """One further coefficient with its standard uncertainty, and the decision whether it is present."""
 
     kind: Literal["quadratic", "asymmetry", "g_sensitivity"]
     """Kind of the term"""

@@ -45,7 +45,7 @@ class UpAgainstDown(Part):
 
 
 class Calibrated(Part):
-    """The sensors' calibration as a whole."""
+    """Calibration of all temperature sensors of a unit: lines, correction, hysteresis."""
 
     sensors: tuple[SensorFit, ...]
     """Thermometers, one entry each"""

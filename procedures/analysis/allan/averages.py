@@ -30,7 +30,7 @@ STANDS_OUT = 4.0
 
 
 def block_of(count: int) -> int:
-    """Samples per block, s: a power of two."""
+    """Return the number of samples per block, s: a power of two, for a series of `count` samples."""
     return LEAST << max(0, ceil(log2(count / (LEAST * MOST_BLOCKS))))
 
 
@@ -53,7 +53,9 @@ def remainder_kernel(s: int) -> Array:
 
 
 def lines(spectrum: Array) -> float:
-    """Share of spectral lines in the remainders' spectrum (n,): power far above the median of its neighbourhood."""
+    """Return the share of spectral lines in the remainders' spectrum (n,): power far above the median of its
+    neighbourhood.
+    """
     bands = spectrum[: len(spectrum) // NEIGHBOURS * NEIGHBOURS].reshape(-1, NEIGHBOURS)
     above = bands - STANDS_OUT * np.median(bands, axis=1)[:, None]
     # The first band, where the remainders begin, is steep and has no lines of importance.
@@ -88,11 +90,16 @@ class BlockMeans:
         self._done += whole
 
     def means(self) -> Array:
-        """The block means a_b, (count // s,)."""
+        """Return the block means a_b, (count
+
+        s,), of all samples so far.
+        """
         return self.begins[:-1] + self._means
 
 
 def weighted_mean(ends: Array, totals: Array, starts: NDArray[np.int64], length: int) -> Array:
-    """Mean per sample over [start, start + length), (k,), of a quantity with the running totals `totals` at `ends`."""
+    """Return the mean per sample over [start, start + length), (k,), of a quantity with the running totals `totals` at
+    `ends`.
+    """
     upper, lower = (np.interp(at, ends, totals) for at in (starts + length, starts))
     return (upper - lower) / length

@@ -78,7 +78,7 @@ class BandStream:
         self._waiting: list[Array] = []
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
-        """Add the next samples of the channel, (n,). Raises `UnfitRecording`."""
+        """Add the next samples of the channel, (n,). Raises `UnfitRecording` for a gap or too many samples."""
         for piece in self._integral.add(block):
             first = -self._index % self._stride
             kept = piece.x[first :: self._stride]
@@ -100,7 +100,7 @@ class BandStream:
         self._x = self._x[-kept:]
 
     def finish(self) -> Band:
-        """The band, after the last sample. Raises `UnfitRecording`."""
+        """Return the band. Call once, after the last sample. Raises `UnfitRecording` where samples are missing."""
         self._integral.check_end(self._count)
         rows: list[tuple[float, ...]] = []
         if self._near:
@@ -126,7 +126,7 @@ def _row(m: int, sums: Array, terms: Array) -> tuple[float, ...]:
 
 
 def start_sums(x: Array, m: int) -> tuple[Array, Array]:
-    """``Σ_j (Δ_m² x_{o+jm})²`` and its number of terms for each offset o, (min(m, starts),) each."""
+    """Return ``Σ_j (Δ_m² x_{o+jm})²`` and its number of terms for each offset o, (min(m, starts),) each."""
     starts = len(x) - 2 * m
     offsets = min(m, starts)
     sums = np.zeros(offsets)

@@ -34,11 +34,13 @@ TAIL = 1 << 16
 
 
 class Uncorrelatable(UnfitRecording):
-    """The fast sums would lose accuracy on this channel; difference it term by term (``correlate=False``)."""
+    """Raised where the fast sums would lose accuracy on this channel; difference it term by term
+    (``correlate=False``).
+    """
 
 
 def snapped(sizes: Sizes, statistic: Statistic, count: int) -> tuple[Sizes, Sizes]:
-    """The sizes as they will be computed and the spacing of their starts [samples], both (k,), ascending.
+    """Return the sizes as they will be computed and the spacing of their starts [samples], both (k,), ascending.
 
     Exact sizes have spacing 1; larger ones are multiples of their spacing.
     """
@@ -82,7 +84,9 @@ class SharedProducts:
 
 
 class CorrelatedSums:
-    """Sums of an overlapping member for many cluster sizes, from samples less a constant; no gaps."""
+    """Sums of squared differences of one overlapping statistic at many cluster sizes, from samples without gaps from
+    which a constant (their mean, about) was taken. The fast method, for long series.
+    """
 
     def __init__(self, statistic: Statistic, count: int, sizes: Sizes, shared: SharedProducts | None = None) -> None:
         """`shared`: of several members, which are then fed through it, once."""
@@ -93,11 +97,13 @@ class CorrelatedSums:
         self._blocks, self._lagged = self._shared.blocks, self._shared.lagged
 
     def add(self, y: Array) -> None:
-        """Add the next samples, (n,)."""
+        """Add the next samples less a constant, (n,), without gaps."""
         self._shared.add(y)
 
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
-        """Sums and numbers of terms at `sizes`, (k,) each, after the last sample. Raises `Uncorrelatable`."""
+        """Sums of squared differences and their term counts, (k,) each, at `self.sizes` (not the sizes asked for: see
+        `snapped`). Call once, after the last sample. Raises `Uncorrelatable` where the fast method loses accuracy.
+        """
         products = self._shared.products
         near = padded_sums(products, self._statistic, self._near)
         near -= edge_sums(self._shared.head, self._shared.tail, self._near, self._span, self._squares)
@@ -109,13 +115,13 @@ class CorrelatedSums:
         return np.concatenate([near, far[0]]), np.concatenate([np.array(terms, np.int64), far[1]])
 
     def starts(self) -> NDArray[np.int64]:
-        """Number of averaged terms, (k,): all that fit for exact sizes, one per spacing for larger ones."""
+        """Return the number of averaged terms, (k,): all that fit for exact sizes, one per spacing for larger ones."""
         near = [self._statistic.starts(self._count, int(m)) for m in self._near]
         far = [self._far_terms(i) for i in range(len(self._near), len(self.sizes))]
         return np.array(near + far, np.int64)
 
     def held(self) -> Held:
-        """The points of the running sum that the noise identification needs."""
+        """Return the values of the running sum that the noise identification needs."""
         return Held(self._blocks.begins, self._blocks.size, np.cumsum(self._shared.tail))
 
     def _span(self, m: int) -> int:

@@ -80,7 +80,7 @@ class DeviationStream:
             self._sums = CorrelatedSums(statistic, count, wanted)
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
-        """Add the next samples of the channel, (n,)."""
+        """Add the next samples of the channel, (n,). Raises `UnfitRecording` for more than were announced."""
         if self._integral.count + len(block) > self._count:
             raise UnfitRecording(f"more samples came than the {self._count} that were announced")
         if isinstance(self._sums, CorrelatedSums):
@@ -91,7 +91,9 @@ class DeviationStream:
                 self._sums.add(piece)
 
     def finish(self) -> Deviation:
-        """The deviation, after the last sample; cluster sizes without a single term (gaps) do not appear."""
+        """Return the deviation. Call once, after the last sample; cluster sizes without a single term (gaps) do not
+        appear.
+        """
         self._integral.check_end(self._count)
         return from_sums(self._statistic, self._rate_hz, self._count, self._sums, self._integral, self._confidence)
 
@@ -99,7 +101,9 @@ class DeviationStream:
 def from_sums(
     statistic: Statistic, rate_hz: float, count: int, of: Sums, integral: Integral, confidence: float
 ) -> Deviation:
-    """The deviation from sums that all samples, and their `integral`, have gone through."""
+    """Return the deviation from sums that all samples, and their `integral`, have gone through. Raises `UnfitRecording`
+    where no term was left.
+    """
     sums, terms = of.finish()
     if isinstance(of, CorrelatedSums):
         sums = sums * integral.scale**2

@@ -18,7 +18,7 @@ _UNTHREADED = 1 << 13
 
 
 def squared(d: Array) -> float:
-    """Sum of squares ``Σ d²`` of a vector, (n,)."""
+    """Return the sum of squares ``Σ d²`` of a vector, (n,)."""
     parts = (d[a : a + _UNTHREADED] for a in range(0, len(d), _UNTHREADED))
     return sum(float(np.dot(part, part)) for part in parts)
 
@@ -76,7 +76,9 @@ def sum_of_smoothed_squares(x: Array, missing: Counts | None, m: int, reach: int
 
 
 class NonOverlappingSums:
-    """Sums of a non-overlapping member, exact at every size; memory for `TOGETHER` points a size at most."""
+    """Sums of squared differences of a non-overlapping statistic at many cluster sizes, each exact; memory for
+    `TOGETHER` points a size at most.
+    """
 
     def __init__(self, statistic: Statistic, count: int, sizes: Sizes) -> None:
         self._statistic, self._count, self.sizes = statistic, count, sizes
@@ -120,15 +122,17 @@ class NonOverlappingSums:
         self._held[i] = len(self._points[i][0])
 
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
-        """Sums and numbers of terms at `sizes`, (k,) each, after the last piece."""
+        """Return the sums of squared differences and their term counts, (k,) each, at `self.sizes`. Call once, after
+        the last piece.
+        """
         for i in range(len(self.sizes)):
             self._difference(i)
         return self._sums, self._terms
 
     def held(self) -> Held:
-        """The points of the running sum that the noise identification needs."""
+        """Return the values of the running sum that the noise identification needs."""
         return self._late.held()
 
     def starts(self) -> NDArray[np.int64]:
-        """Number of terms that fit, with or without gaps, (k,)."""
+        """Return the number of terms that fit, with or without gaps, (k,)."""
         return np.array([self._statistic.starts(self._count, int(m)) for m in self.sizes], np.int64)

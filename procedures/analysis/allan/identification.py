@@ -53,7 +53,7 @@ def _quadratics(count: int) -> Array:
 
 @dataclass(frozen=True)
 class Held:
-    """Values of a running sum that the identification needs."""
+    """Values of a running sum that the identification needs: every s-th from the first on, and all of the last ones."""
 
     points: Array
     """The running sum at every `stride`-th sample, (n,)."""
@@ -63,7 +63,7 @@ class Held:
 
 
 class LatePoints:
-    """Keep the values of a running sum that the identification needs: every s-th, and all of the last ones."""
+    """Collects the values of a running sum that the identification needs: every s-th, and all of the last ones."""
 
     def __init__(self, count: int) -> None:
         self._stride = max(1, count // _HELD)
@@ -84,7 +84,7 @@ class LatePoints:
             self._late[end - len(kept) : end] = kept
 
     def held(self) -> Held:
-        """The kept values, after the last piece."""
+        """Return the kept values. Call after the last piece."""
         return Held(self._points, self._stride, self._late)
 
 

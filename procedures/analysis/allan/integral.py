@@ -19,7 +19,7 @@ PIECE = 1 << 17
 
 @dataclass(frozen=True)
 class Piece:
-    """Running sums x_k of consecutive k, (n,)."""
+    """Running sums x_k of consecutive k, (n,), with the number of missing samples before each."""
 
     x: Array
     missing: Counts | None
@@ -50,12 +50,16 @@ class Integral:
         self.first_missing: int | None = None
 
     def add(self, block: Array | NDArray[np.int32]) -> Iterator[Piece]:
-        """The sums at the ends of a block's samples (n,), in pieces. Raises `UnfitRecording`."""
+        """Yield the running sums at the ends of a block's samples (n,), in pieces. Raises `UnfitRecording` for a gap
+        that is refused.
+        """
         for y in self._pieces(block):
             yield self._piece(y)
 
     def rates(self, block: Array | NDArray[np.int32]) -> Iterator[Array]:
-        """A block's samples less the reference, in pieces, unscaled (see `scale`); only where gaps are refused."""
+        """Yield a block's samples less the reference, in pieces, unscaled (see `scale`); only where gaps are
+        refused.
+        """
         for y in self._pieces(block):
             rates, _ = self._checked(y)
             self.count += len(y)

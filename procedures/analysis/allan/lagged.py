@@ -42,7 +42,7 @@ class LaggedProducts:
         """``Σ_l κ(l) R(l)``, l of both signs, up to each of `ends` (one a window)."""
 
     def add(self, y: Array) -> None:
-        """Add the next samples, (n,)."""
+        """Add the next samples, (n,), without gaps."""
         self._rest = np.concatenate([self._rest, y])
         self._take_whole(TOGETHER)
 
@@ -56,7 +56,7 @@ class LaggedProducts:
             self._rest = self._rest[rows * step :]
 
     def finish(self) -> Array:
-        """The lagged products R, (reach,), after the last piece."""
+        """Return the lagged products R, (reach,). Call once, after the last piece."""
         self._take_whole(1)
         if len(self._rest):
             self._take(self._rest[None, :], len(self._rest))
@@ -64,7 +64,9 @@ class LaggedProducts:
         return products - _inverse(_paired(self._seams), 2 * self._reach)[: self._reach]
 
     def spectrum(self) -> Array:
-        """Mean over the windows of each one's part of `energies` by frequency, (length/2 + 1,), its sum near 1."""
+        """Return the mean over the windows of each one's part of `energies` by frequency, (length/2 + 1,), its sum near
+        1.
+        """
         return _paired(self._shape * self._response) / (len(self.ends) - 1)
 
     def _take(self, windows: Array, step: int) -> None:
@@ -151,6 +153,6 @@ def edge_sums(
 
 
 def worst_rounding(sums: Array, spans: Sizes, squares: float) -> float:
-    """A bound of the relative rounding error of the sums, R known to 16ε: ``16ε·Σy²·span^1.5/ΣD²``."""
+    """Return a bound of the relative rounding error of the sums, R known to 16ε: ``16ε·Σy²·span^1.5/ΣD²``."""
     bounds = 16.0 * float(np.finfo(float).eps) * squares * spans**1.5
     return float(np.max(bounds / sums)) if np.all(sums > 0.0) else float("inf")

@@ -28,12 +28,12 @@ SMOOTH = 16
 
 
 def stride_of(count: int) -> int:
-    """Step s of the held points, a power of two; 1 where the series is held whole."""
+    """Return the step s of the held points, a power of two; 1 where the series is held whole."""
     return 1 if count <= WHOLE else 1 << int(np.log2(count / POINTS))
 
 
 def exact_limit(statistic: Statistic, count: int) -> int:
-    """The largest cluster size that uses every start."""
+    """Return the largest cluster size that uses every start."""
     if count <= WHOLE or not statistic.overlapping:
         return count
     near = BLOCK // statistic.differences
@@ -41,7 +41,9 @@ def exact_limit(statistic: Statistic, count: int) -> int:
 
 
 def strides_of(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
-    """Samples between the starts that a size uses: 1, s, or 4s for sizes of at least `LONG` held points."""
+    """Return the samples between the starts that a size uses, (k,): 1, s, or 4s for sizes of at least `LONG` held
+    points.
+    """
     s = stride_of(count)
     if s == 1 or not statistic.overlapping:
         return np.ones(len(sizes), np.int64)
@@ -50,7 +52,7 @@ def strides_of(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
 
 
 def snapped_sizes(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
-    """The sizes as they will be computed: multiples of the strides they use."""
+    """Return the sizes as they will be computed, (k,): multiples of the strides they use."""
     s = strides_of(sizes, statistic, count)
     return np.unique(np.minimum(np.round(sizes / s).astype(np.int64), statistic.largest(count) // s) * s)
 
@@ -86,7 +88,9 @@ class _Points:
 
 
 class OverlappingSums:
-    """Sums of an overlapping member for many cluster sizes, from pieces of x."""
+    """Sums of squared differences of an overlapping statistic at many cluster sizes, term by term, with or without
+    gaps.
+    """
 
     def __init__(self, statistic: Statistic, count: int, sizes: Sizes) -> None:
         self._statistic, self._count = statistic, count
@@ -138,7 +142,9 @@ class OverlappingSums:
         return sum_of_squares(x, missing, m, p, stop)
 
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
-        """Sums and numbers of terms at `sizes`, (k,) each, after the last piece."""
+        """Sums of squared differences and their term counts, (k,) each, at `self.sizes`. Call once, after the last
+        piece.
+        """
         if len(self._near):
             self._difference(slice(None), None)
         points, gaps = self._points.x, self._points.missing
@@ -151,10 +157,10 @@ class OverlappingSums:
         return self._sums, self._terms
 
     def held(self) -> Held:
-        """The points of the running sum that the noise identification needs."""
+        """Return the values of the running sum that the noise identification needs."""
         return self._late.held()
 
     def starts(self) -> NDArray[np.int64]:
-        """Number of starts that fit, with or without gaps, (k,)."""
+        """Return the number of starts that fit, with or without gaps, (k,)."""
         whole = np.array([self._statistic.starts(self._count, int(m)) for m in self.sizes], np.int64)
         return (whole - 1) // self.strides + 1

@@ -36,7 +36,7 @@ LINES = {
 
 @dataclass(frozen=True)
 class Line:
-    """One straight stretch and the coefficient read on it."""
+    """One straight stretch of an Allan plot, and the coefficient that is read on it."""
 
     slope: float
     coefficient: float
@@ -49,7 +49,7 @@ class Line:
 
 @dataclass(frozen=True)
 class ReadOff:
-    """The lines that were found; None where a process is absent."""
+    """Lines that were found on an Allan plot, one a process; None where a process is absent."""
 
     quantization: Line | None
     random_walk: Line | None
@@ -59,7 +59,9 @@ class ReadOff:
 
 
 def read_off(deviation: Deviation) -> ReadOff:
-    """Reads an Allan deviation of a rate (overlapping or not). Raises `BadParameter` for another statistic."""
+    """Return the lines of an Allan deviation of a rate (overlapping or not). Raises `BadParameter` for another
+    statistic.
+    """
     if deviation.statistic.order != 2 or deviation.statistic.modified:
         raise BadParameter("statistic", deviation.statistic.name, "allan or overlapping_allan")
     shown = deviation.deviation > 0.0  # a counter that turns evenly can repeat its counts exactly: no logarithm

@@ -35,7 +35,9 @@ class Sampled:
 
 
 class SampledStream:
-    """The deviation of one channel from blocks, at some sizes, in bounded memory. Gaps are refused."""
+    """Running Allan deviation of one channel from sampled intervals, at some sizes, in bounded memory. Gaps are
+    refused.
+    """
 
     def __init__(
         self,
@@ -60,7 +62,7 @@ class SampledStream:
         self._index = 1
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
-        """Add the next samples of the channel, (n,). Raises `UnfitRecording`."""
+        """Add the next samples of the channel, (n,). Raises `UnfitRecording` for a gap."""
         for piece in self._integral.add(block):
             first = -self._index % self._stride
             kept = piece.x[first :: self._stride]
@@ -69,7 +71,9 @@ class SampledStream:
             self._index += len(piece.x)
 
     def finish(self) -> Sampled:
-        """The deviations, after the last sample. Raises `UnfitRecording`."""
+        """Return the deviations. Call once, after the last sample. Raises `UnfitRecording` where samples are
+        missing.
+        """
         self._integral.check_end(self._count)
         x, rows = self._points, []
         for size in self._held:

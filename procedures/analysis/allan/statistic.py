@@ -28,7 +28,7 @@ FEWEST_SAMPLES = 12
 
 @dataclass(frozen=True)
 class Statistic:
-    """One member of the Allan family."""
+    """One member of the Allan family: name, order of its difference, overlapping or not, modified or not."""
 
     name: str
     order: int
@@ -44,18 +44,20 @@ class Statistic:
         return self.order + self.modified
 
     def starts(self, count: int, m: int) -> int:
-        """Number of starts k where a term of cluster size m fits into `count` samples; non-overlapping: of terms."""
+        """Return the number of starts k where a term of cluster size m fits into `count` samples; non-overlapping: of
+        terms.
+        """
         last = count + self.modified - self.differences * m
         if last < 0:
             return 0
         return last + 1 if self.overlapping else last // m + 1
 
     def largest(self, count: int) -> int:
-        """The largest cluster size at which one term fits."""
+        """Return the largest cluster size at which one term fits into `count` samples."""
         return (count + self.modified) // self.differences
 
     def variance(self, sums: Array, terms: Array, sizes: Sizes, rate_hz: float) -> Array:
-        """σ² [rate²] from sums of squared differences, (k,); of the time deviation [(rate·s)²]."""
+        """Return σ² [rate²] from sums of squared differences, (k,); of the time deviation [(rate·s)²]."""
         m = sizes.astype(np.float64)
         squared = m**4 if self.modified else m**2
         variance = sums / (np.maximum(terms, 1.0) * squared * comb(2 * self.order - 2, self.order - 1))
@@ -72,31 +74,35 @@ STATISTICS = {s.name: s for s in (ALLAN, OVERLAPPING_ALLAN, MODIFIED_ALLAN, TIME
 
 
 def log_sizes(largest: int, number: int = 200) -> Sizes:
-    """Cluster sizes 1…largest, evenly in the logarithm, whole and without repetition: the thesis's rule."""
+    """Return cluster sizes 1…largest, evenly in the logarithm, whole and without repetition: the thesis's rule."""
     spread = np.floor(np.exp(np.linspace(0.0, np.log(max(largest, 1)), number))).astype(np.int64)
     return np.unique(np.append(spread[:-1], max(largest, 1)))
 
 
 def decade_sizes(largest: int, step: float) -> Sizes:
-    """Cluster sizes with a step in decades (paper A: 0.002), whole and without repetition."""
+    """Return cluster sizes with a step in decades (paper A: 0.002), whole and without repetition. Raises `BadParameter`
+    for a step that is not positive.
+    """
     if not 0.0 < step <= 1.0:
         raise BadParameter("step", step, "0 < step ≤ 1 decade")
     return np.unique(np.round(10.0 ** np.arange(0.0, log10(max(largest, 1)) + 1e-9, step)).astype(np.int64))
 
 
 def octave_sizes(largest: int) -> Sizes:
-    """Cluster sizes 1, 2, 4 … up to `largest`."""
+    """Return cluster sizes 1, 2, 4 … up to `largest`."""
     return 1 << np.arange(max(largest, 1).bit_length(), dtype=np.int64)
 
 
 def one_two_four_sizes(largest: int) -> Sizes:
-    """Cluster sizes 1, 2, 4, 10, 20, 40 … up to `largest`."""
+    """Return cluster sizes 1, 2, 4, 10, 20, 40 … up to `largest`."""
     sizes = np.array([d * 10**e for e in range(len(str(max(largest, 1)))) for d in (1, 2, 4)], np.int64)
     return sizes[sizes <= max(largest, 1)]
 
 
 def checked_sizes(sizes: Sequence[int] | Sizes | None, count: int, statistic: Statistic) -> Sizes:
-    """The requested cluster sizes, ascending, or the default ones. Raises `UnfitRecording` and `BadParameter`."""
+    """Return the requested cluster sizes, ascending, or the default ones. Raises `UnfitRecording` and
+    `BadParameter`.
+    """
     if count < FEWEST_SAMPLES:
         raise UnfitRecording(f"{count} samples are too few for an Allan deviation; the least is {FEWEST_SAMPLES}")
     largest = statistic.largest(count)

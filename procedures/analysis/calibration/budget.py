@@ -37,7 +37,7 @@ TABLE = ("orthogonality", "level", "azimuth", "gravity", "pointing", "direction"
 
 @dataclass(frozen=True)
 class Part:
-    """Covariance of the station means by one source."""
+    """Covariance of the station means by one source of uncertainty."""
 
     source: str
     value: tuple[float, float, float]
@@ -52,7 +52,7 @@ class Part:
 
 @dataclass(frozen=True)
 class BudgetRow:
-    """One source of uncertainty of one coefficient."""
+    """One source of uncertainty of one coefficient: value, distribution, divisor, sensitivity, contribution."""
 
     source: str
     value: float
@@ -70,7 +70,7 @@ class BudgetRow:
 
 @dataclass(frozen=True)
 class Budget:
-    """Uncertainty budget of one coefficient."""
+    """Uncertainty budget of one coefficient: rows by source, and the expanded uncertainty."""
 
     coefficient: CoefficientName
     unit: str
@@ -108,14 +108,16 @@ def noise_parts(record: TriadRecord, windows: Array, rate_unit: str) -> list[Par
 
 
 def observed_part(fit: TriadFit) -> Part:
-    """The noise where it is not known: of the recordings themselves, scaled to the residuals."""
+    """Return the noise where it is not known: of the recordings themselves, scaled to the residuals."""
     x, y, z = np.sqrt(np.mean(np.diagonal(fit.station_noise, axis1=1, axis2=2), axis=1)).tolist()
     freedom = float(max(1, fit.degrees_of_freedom))
     return Part(OBSERVED, (x, y, z), fit.output_unit, fit.station_noise, degrees_of_freedom=freedom)
 
 
 def thermal_parts(covariances: Mapping[str, Array], unit: str) -> list[Part]:
-    """Parts of a thermal correction by name; their values are what they leave in a station mean, root mean square."""
+    """Return the parts of a thermal correction by name; their values are what they leave in a station mean, root mean
+    square.
+    """
     found: list[Part] = []
     for source, covariance in covariances.items():
         x, y, z = np.sqrt(np.mean(np.diagonal(covariance, axis1=1, axis2=2), axis=1)).tolist()
@@ -124,7 +126,7 @@ def thermal_parts(covariances: Mapping[str, Array], unit: str) -> list[Part]:
 
 
 def budgets(fit: TriadFit, parts: Sequence[Part], table: TableErrors) -> tuple[Budget, ...]:
-    """The budget of each of the twelve coefficients, in their order."""
+    """Return the budget of each of the twelve coefficients, in their order."""
     of_parts = part_rows(parts, fit.estimator.gain)
     of_table = {s: fit.table.standard_uncertainty(s) for s in TABLE if s in fit.table.source}
     values = {s: declared_value(table, s) for s in of_table}
@@ -137,7 +139,9 @@ def budgets(fit: TriadFit, parts: Sequence[Part], table: TableErrors) -> tuple[B
 
 
 def part_rows(parts: Sequence[Part], gain: Array) -> list[list[BudgetRow]]:
-    """Rows of each coefficient by the parts, through the gain (k, 3, n) from means to coefficients, k/3 a channel."""
+    """Return the rows of each coefficient by the parts, through the gain (k, 3, n) from means to coefficients, k/3 a
+    channel.
+    """
     through = [np.sqrt(np.maximum(np.einsum("kci,cij,kcj->k", gain, p.covariance, gain), 0.0)) for p in parts]
     return [
         [
@@ -149,7 +153,7 @@ def part_rows(parts: Sequence[Part], gain: Array) -> list[list[BudgetRow]]:
 
 
 def budget_of(name: CoefficientName, unit: str, rows: Sequence[BudgetRow]) -> Budget:
-    """The budget of one coefficient by its rows: root sum of squares, effective degrees of freedom, coverage."""
+    """Return the budget of one coefficient by its rows: root sum of squares, effective degrees of freedom, coverage."""
     total = float(np.sqrt(sum(r.contribution**2 for r in rows)))
     freedom = combined_freedom([(r.contribution, r.degrees_of_freedom) for r in rows]) if total > 0.0 else None
     factor = coverage_factor(COVERAGE, freedom)
@@ -165,13 +169,13 @@ def row_of(
     divisor: float = 1.0,
     freedom: float | None = None,
 ) -> BudgetRow:
-    """One row, with the sensitivity that its contribution means."""
+    """Return one row of a budget, with the sensitivity that its contribution implies."""
     sensitivity = contribution * divisor / value if value > 0.0 else 0.0
     return BudgetRow(source, value, unit, distribution, divisor, sensitivity, contribution, freedom)
 
 
 def declared_value(table: TableErrors, source: str) -> tuple[float, str]:
-    """Declared standard deviation of a source, and its unit."""
+    """Return the declared standard deviation of a source of the table, and its unit."""
     if source == "mounting":
         return table.seat_sd_rad / units.ARCSEC, "arcsec"
     sd = float(np.max(table.sd[table.columns(source)]))

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, ndtri, ndtri_exp
-from scipy.stats import chi2
 
 from procedures.analysis.calibration.table_errors import TableErrors
 from procedures.analysis.least_squares.chi_square import tail_probability
@@ -54,7 +53,7 @@ class Change:
 
     @property
     def name(self) -> str:
-        """The coefficients as a sentence names them."""
+        """Names of the coefficients as a sentence lists them."""
         return " or ".join(self.coefficients)
 
 
@@ -107,7 +106,7 @@ def residual_covariance(
 
 
 def coefficient_columns(vectors: Array) -> Array:
-    """Outputs per change of the twelve coefficients, stacked channel by channel: A, shape (3n, 12)."""
+    """Return the outputs per change of the twelve coefficients, stacked channel by channel: A, shape (3n, 12)."""
     one = np.column_stack([np.ones(len(vectors)), vectors])
     return np.asarray(np.kron(np.eye(3), one), dtype=np.float64)
 
@@ -115,7 +114,7 @@ def coefficient_columns(vectors: Array) -> Array:
 def diagnose(
     calibration: TriadCalibration, outputs: Array, vectors: Array, covariance: Array, table: TableErrors
 ) -> TriadDiagnosis:
-    """Score every change that the residuals of n ≥ 2 stations could show; outputs and vectors (n, 3).
+    """Return the scores of every change that the residuals of n ≥ 2 stations could show; outputs and vectors (n, 3).
 
     `covariance` as `residual_covariance` gives it; `table` says how a turn of its zero would look.
     """
@@ -187,6 +186,8 @@ def _change(
 
 def _as_sigmas(statistic: float, degrees: int) -> float:
     """Normal deviation as likely, two-sided, as a chi-square so large; not past what doubles can tell apart."""
+    from scipy.stats import chi2  # with all of scipy's statistics: only where it is called
+
     if degrees == 0:
         return 0.0
     if degrees == 1:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from procedures.analysis.calibration.table_errors import SOURCES, TableErrors
 from procedures.analysis.least_squares.determination import require_full_rank
@@ -36,15 +35,15 @@ class Estimator:
     """Condition number of the column-scaled design."""
 
     def coefficients(self, outputs: Array) -> Array:
-        """Estimate the twelve coefficients from outputs (n, 3); shape (12,)."""
+        """Return the twelve coefficients estimated from outputs (n, 3); shape (12,)."""
         return np.einsum("kcn,nc->k", self.gain, outputs)
 
     def modelled(self, coefficients: Array) -> Array:
-        """Predict the outputs ``b + K·v`` at the stations from twelve coefficients, shape (n, 3)."""
+        """Return the outputs ``b + K·v`` at the stations, predicted from twelve coefficients, shape (n, 3)."""
         return self.design @ coefficients.reshape(3, 4).T
 
     def remaining(self) -> Array:
-        """Residual operator ``1 − A·G``: residuals from outputs, both stacked channel by channel, shape (3n, 3n)."""
+        """Return the operator ``1 − A·G``: residuals from outputs, both stacked channel by channel, shape (3n, 3n)."""
         n = len(self.design)
         explained = np.einsum("ia,cadj->cidj", self.design, self.gain.reshape(3, 4, 3, n))
         return np.eye(3 * n) - explained.reshape(3 * n, 3 * n)
@@ -52,7 +51,7 @@ class Estimator:
 
 @dataclass(frozen=True)
 class TableShare:
-    """Contribution of the table's flaws to the twelve coefficients."""
+    """Contribution of the table's flaws to the uncertainty of the twelve coefficients, by source."""
 
     per_sd: Array
     """Change of the coefficients per standard deviation of each flaw, shape (12, P)."""
@@ -64,12 +63,12 @@ class TableShare:
         return self.per_sd @ self.per_sd.T
 
     def standard_uncertainty(self, source: str) -> Array:
-        """Standard uncertainties of the twelve coefficients from one source alone, shape (12,)."""
+        """Return the standard uncertainties of the twelve coefficients from one source alone, shape (12,)."""
         columns = np.array([s == source for s in self.source], dtype=bool)
         return np.sqrt(np.sum(self.per_sd[:, columns] ** 2, axis=1))
 
     def by_source(self) -> dict[str, Array]:
-        """Standard uncertainties (12,) of every source that contributes."""
+        """Return the standard uncertainties (12,) of every source that contributes, by its name."""
         parts = {source: self.standard_uncertainty(source) for source in (*SOURCES, MOUNTING)}
         return {source: part for source, part in parts.items() if np.any(part > 0.0)}
 
@@ -120,7 +119,9 @@ def _with_flaws(design: Array, whitening: Array, flaws: Array) -> Array:
         stacked[rows, p + 4 * channel : p + 4 * channel + 4] = weights @ design / scale
     stacked[3 * n :, :p] = np.eye(p)
     q, r = np.linalg.qr(stacked)
-    whitened = np.asarray(solve_triangular(r[p:, p:], q[: 3 * n, p:].T)).reshape(12, 3, n)
+    # the LU of a triangle is the triangle, so the digits are those of a triangular solver; that of scipy wakes threads
+    # of BLAS and waits for them, 10 ms a call on a busy machine
+    whitened = np.linalg.solve(r[p:, p:], q[: 3 * n, p:].T).reshape(12, 3, n)
     return _times_each(whitened, whitening) / np.tile(scale, 3)[:, None, None]
 
 

@@ -50,7 +50,7 @@ class Term:
 
 @dataclass(frozen=True)
 class TermEstimate:
-    """One coefficient with its standard uncertainty and the decision whether it is there."""
+    """One further coefficient with its standard uncertainty, and the decision whether it is present."""
 
     kind: Kind
     name: str
@@ -98,7 +98,9 @@ def terms_of(kinds: Sequence[Kind], vectors: Array, forces: Array | None) -> tup
 
 
 def require_terms(what: str, vectors: Array, terms: Sequence[Term], tolerance: float = RANK_TOLERANCE) -> float:
-    """Condition number of the channel that is determined worst. Raises `Undetermined` saying which position to add."""
+    """Return the condition number of the channel that is determined worst. Raises `Undetermined` saying which position
+    to add.
+    """
     worst = 1.0
     for c, axis in enumerate(AXES):
         own = [t for t in terms if t.channel == c]
@@ -182,7 +184,7 @@ def _estimates(
 
 
 def named(fit: ExtraFit) -> dict[str, float]:
-    """All coefficients by name: the twelve, then the terms."""
+    """Return all coefficients by name: the twelve, then the terms."""
     return dict(zip(COEFFICIENT_NAMES, fit.coefficients.tolist(), strict=True)) | {
         t.name: t.estimate for t in fit.terms
     }

@@ -67,7 +67,7 @@ class Misfit:
         return ()
 
     def checks(self, name: str, limit: float) -> tuple[Check, ...]:
-        """The ratio against its limit; none where nothing is left to check with."""
+        """Return the check of the ratio against its limit; nothing where no equation is left to check with."""
         if self.ratio is None:
             return ()
         bound = Limit("1", maximum=limit, source="ours")
@@ -75,12 +75,14 @@ class Misfit:
 
 
 def ratio_of(chi_square: float, spare: int, slow: float = 0.0) -> float | None:
-    """``√(χ²/ν/(1 + κ))``, or None of no spare equation."""
+    """Return ``√(χ²/ν/(1 + κ))``; None where no equation is spare."""
     return float(np.sqrt(chi_square / spare / (1.0 + slow))) if spare > 0 else None
 
 
 def scalar_misfit(fit: ScalarFit, outputs: Array, labels: tuple[str, ...], slow: float) -> Misfit:
-    """Misfit of a scalar calibration of outputs (n, 3); names the channels with most weight in the worst magnitude."""
+    """Return the misfit of a scalar calibration of outputs (n, 3); names the channels with most weight in the worst
+    magnitude.
+    """
     ratio = ratio_of(fit.chi_square, fit.degrees_of_freedom, slow)
     if ratio is None:
         return Misfit(None, fit.degrees_of_freedom, "")
@@ -97,7 +99,7 @@ def scalar_misfit(fit: ScalarFit, outputs: Array, labels: tuple[str, ...], slow:
 def residual_misfit(
     residuals: Array, expected_sd: Array, chi_square: float, spare: int, labels: Sequence[str], slow: float = 0.0
 ) -> Misfit:
-    """Misfit of residuals (n, 3), channel by channel, with their expected standard deviations (n, 3)."""
+    """Return the misfit of residuals (n, 3), channel by channel, with their expected standard deviations (n, 3)."""
     ratio = ratio_of(chi_square, spare, slow)
     if ratio is None:
         return Misfit(None, spare, "")
@@ -108,9 +110,10 @@ def residual_misfit(
 
 
 def require_live(triad: str, outputs: Array, output_unit: str, expected: Array | None = None) -> None:
-    """Refuse means (n, 3) of which a channel does not change from pose to pose as the others do: `UnfitRecording`.
+    """Refuse means (n, 3) of which a channel does not change from pose to pose as the others do. Raises
+    `UnfitRecording`.
 
-    `expected` (n, 3) are the inputs where they are known; else every channel is to feel about the same change.
+    `expected` (n, 3) are the inputs where they are known; else every channel is expected to change about equally.
     """
     spans = np.ptp(outputs, axis=0)
     felt = spans / (1.0 if expected is None else np.ptp(expected, axis=0))
@@ -123,7 +126,7 @@ def require_live(triad: str, outputs: Array, output_unit: str, expected: Array |
 
 
 def require_plausible_scales(triad: str, scales: Array, nominal: bool) -> None:
-    """Refuse scale factors (3,) that are negative or absurd, naming the channel: `UnfitRecording`.
+    """Refuse scale factors (3,) that are negative or absurd, naming the channel. Raises `UnfitRecording`.
 
     `nominal`: the outputs are in SI units, so that a scale factor near one is expected; counts are compared with each
     other alone.

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
+from procedures.analysis.calibration.magnitude import in_sample_gain, magnitude_gradient
 from procedures.analysis.calibration.reference import reference_vectors
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import windows
@@ -42,7 +44,9 @@ class TriadPlan:
     """Scatter at other dwells than the planned one: several limits, and plans that differ in nothing else, share it."""
 
     def at_dwell(self, dwell_s: float | None = None) -> "AtDwell | None":
-        """Noise and estimator at the planned or another dwell; None for unknown noise. Raises `Undetermined`."""
+        """Return noise and estimator at the planned or another dwell [s]; None for unknown noise. Raises
+        `Undetermined`.
+        """
         if dwell_s is None:
             return self._planned
         noise = self.noise_covariance(dwell_s)
@@ -54,7 +58,7 @@ class TriadPlan:
         return None if noise is None else AtDwell(noise, self.estimator(noise))
 
     def scatter(self, dwell_s: float | None = None) -> "Scatter | None":
-        """Scatter between calibrations at a dwell; None for unknown noise. Raises `Undetermined`."""
+        """Return the scatter between calibrations at a dwell [s]; None for unknown noise. Raises `Undetermined`."""
         if dwell_s is None:
             return self._scatter(None)
         if dwell_s not in self.scatters:
@@ -71,16 +75,18 @@ class TriadPlan:
         return Scatter(np.diagonal(gls.noise_covariance), self.share(gls).standard_uncertainty("pointing"))
 
     def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
-        """Covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown noise."""
+        """Return the covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown
+        noise.
+        """
         return triad_covariance(self.unit.triad(self.triad), windows(self.stations, self.axes, dwell_s))
 
     def estimator(self, noise_covariance: Array) -> Estimator:
-        """The generalised least squares of this plan. Raises `Undetermined`."""
+        """Return the generalised least squares of this plan. Raises `Undetermined`."""
         flaws = self._of_outputs if self.weighting == "noise_and_table" else None
         return estimator(f"the {self.triad} coefficients", self.vectors, noise_covariance, flaws)
 
     def share(self, plan: Estimator) -> TableShare:
-        """Contribution of the table's flaws to the coefficients of this plan."""
+        """Return the contribution of the table's flaws to the coefficients of this plan."""
         return table_share(plan, self._of_outputs, self.table, self.matrix)
 
     @cached_property
@@ -113,7 +119,7 @@ def triad_plan(
     uncertainty: TableUncertainty,
     weighting: Weighting = "noise_and_table",
 ) -> TriadPlan:
-    """Plan of a triad at stations that all carry table angles."""
+    """Return the plan of a triad at stations that all carry table angles."""
     angles = [s.angles for s in stations if s.angles is not None]
     vectors, table = _geometry(triad, tuple(angles), site, uncertainty)
     known = unit.known_matrix(triad)
@@ -153,7 +159,7 @@ def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
 
 
 def parts_by_noise(plan: TriadPlan, noise_covariance: Array) -> tuple[Array, Array]:
-    """`predicted_parts` for a known covariance of the station means (3, n, n). Raises `Undetermined`."""
+    """Return `predicted_parts` for a known covariance of the station means (3, n, n). Raises `Undetermined`."""
     return _parts(plan, plan.estimator(noise_covariance))
 
 
@@ -161,8 +167,25 @@ def _parts(plan: TriadPlan, gls: Estimator) -> tuple[Array, Array]:
     return np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
 
 
+def in_sample_covariance(plan: TriadPlan) -> Array | None:
+    """Covariance (n, n) of |v̂| − |v| at the stations of a planned calibration itself; None for unknown noise.
+
+    Noise and the table's flaws, less what the calibration takes from them. Raises `Undetermined`.
+    """
+    planned = plan.at_dwell()
+    if planned is None:
+        return None
+    n = len(plan.vectors)
+    gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
+    along = in_sample_gain(gradient, planned.estimator.remaining())
+    flaws = along @ plan.table.of_outputs(plan.matrix).transpose(1, 0, 2).reshape(3 * n, -1)
+    return along @ block_diag(*planned.noise_covariance) @ along.T + flaws @ flaws.T
+
+
 def basis(plans: Sequence[TriadPlan]) -> str:
-    """Basis of a unit's predicted uncertainties: its calibration, or its nominal scale factors."""
+    """Return the sentence on what a unit's predicted uncertainties rest on: its calibration, or its nominal scale
+    factors.
+    """
     nominal = [plan.triad for plan in plans if not plan.calibrated]
     if len(nominal) == len(plans):
         return "nominal scale factors: the unit has no calibration yet; uncertainties scale with the true ones"

@@ -38,7 +38,7 @@ class Poses:
 
 
 def station_poses(recordings: Sequence[Recording], triad: str, unit: Unit | None) -> Poses:
-    """Poses of stations, one recording a pose."""
+    """Return the poses of stations, one recording a pose. Raises `UnfitRecording`, `MissingChannel`."""
     means = station_means(recordings, triad)
     noise, known = noise_of_means(means, unit.triad(triad) if unit else None)
     slow = 0.0 if known else slow_share(means.slow_excess, noise)

@@ -13,12 +13,12 @@ INPUT_UNITS = {"gyro": "rad/s", "accelerometer": "m/s^2"}
 
 
 def reference_vectors(triad: str, angles: Sequence[TableAngles], site: Site) -> Array:
-    """Earth's rate or specific force in the unit's axes at each station, shape (n, 3), SI."""
+    """Return the Earth's rate or specific force in the unit's axes at each station, shape (n, 3), SI."""
     return earth_rate_b(list(angles), site) if triad == "gyro" else specific_force_b(list(angles), site)
 
 
 def reference_magnitude(triad: str, site: Site) -> float:
-    """Earth's rate [rad/s] or gravity [m/s²]."""
+    """Return the magnitude of the triad's input: Earth's rate [rad/s] or gravity [m/s²]."""
     return site.earth_rate_rad_s if triad == "gyro" else site.gravity_m_s2
 
 
@@ -29,7 +29,7 @@ def site_with(
     azimuth_deg: float | None,
     azimuth_sd_arcsec: float | None,
 ) -> Site:
-    """The bench's site with the values that the parameters override; None keeps the bench's value."""
+    """Return the bench's site with the values that the parameters override; None keeps the bench's value."""
     given = {
         "latitude_deg": latitude_deg,
         "gravity_m_s2": gravity_m_s2,

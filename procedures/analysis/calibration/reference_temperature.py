@@ -5,12 +5,11 @@ departures; at the reference A = B = 0 and ``f = K0·(V₀ + B0)``. So what the 
 
 ``V₀ = [1 + A/K0]·(V + B0 + B) − B0 = Ṽ/K0 − B0``,
 
-for any constants K0 and B0 of this launch, which a calibration estimates. Cross-coupling stays as it is, for
-A multiplies all that passes a torquer. An error δ of B0 leaves δ·A/K0, a thousandth of it. In the form ``switched`` the
-regime is taken as static: a dwell is too short for the indicator.
-
-Temperatures are the sensors' means over the dwell, their lag taken out by their slope, ``T = T_s + τ·dT_s/dt``. What
-the converter's first stage leaves uncertain the correction's own fit has taken up; it is not counted twice.
+for any constants K0 and B0 of this launch, which a calibration estimates. Cross-coupling stays as it is, for A
+multiplies all that passes a torquer. An error δ of B0 leaves δ·A/K0, a thousandth of it. The form ``switched`` is taken
+in its static regime: a dwell is too short for the indicator. Temperatures are the sensors' means over the dwell, their
+lag taken out by their slope, ``T = T_s + τ·dT_s/dt``. The uncertainty of the converter's first stage is in the
+correction's own fit; it is not counted twice.
 """
 
 from collections.abc import Sequence
@@ -56,7 +55,10 @@ def require_correctable(thermal_correction: str, dwell_s: float | None, unit: Un
     if thermal_correction != "current":
         return
     if unit.thermal_correction is None:
-        why = unit.why_withheld("thermal") or f"unit {unit.serial} has no thermal correction yet"
+        why = unit.why_withheld("thermal") or (
+            f"unit {unit.serial} has no current thermal correction: run a thermal_cycle, or choose one of its history; "
+            "one that failed counts only where it is chosen"
+        )
         raise BadParameter("thermal_correction", "current", f"none: {why}")
     if dwell_s is not None and dwell_s < LEAST_DWELL_S:
         raise BadParameter("dwell_s", dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read at the same time")
@@ -232,9 +234,8 @@ def _of_correction(axis: AxisCorrection, v: Array, case: Array, converter: Array
 def gyros_at_reference(
     recordings: Sequence[Recording], means: StationMeans, correction: GyroThermalCorrection
 ) -> tuple[StationMeans, Array]:
-    """Gyro station means ``ω − Σ_k c_k·(T − T_ref)^k``, and the covariance that the coefficients add, (3, n, n).
-
-    Raises `UnfitRecording` where the outputs are no rates, `MissingChannel` without the gyros' sensors.
+    """Gyro station means ``ω − Σ_k c_k·(T − T_ref)^k``, and the covariance that the coefficients add, (3, n, n). Raises
+    `UnfitRecording` where the outputs are no rates, `MissingChannel` without the gyros' sensors.
     """
     if means.output_unit != "rad/s":
         raise UnfitRecording(f"outputs in {means.output_unit} cannot be corrected for temperature: rad/s is needed")
@@ -244,7 +245,7 @@ def gyros_at_reference(
 
 
 def thermal_share(at: AtReference, fit: TriadFit) -> ThermalShare:
-    """Effect of the thermal correction on the accelerometers' calibration, through the estimator of the fit."""
+    """Return the effect of the thermal correction on the calibration, through the estimator of the fit."""
 
     def share(covariance: Array) -> dict[str, float]:
         gain = fit.estimator.gain
@@ -264,7 +265,7 @@ def thermal_share(at: AtReference, fit: TriadFit) -> ThermalShare:
 
 
 def thermal_warnings(at: AtReference) -> tuple[str, ...]:
-    """Warnings about the use of the correction at these temperatures."""
+    """Return warnings about the use of the correction at these temperatures."""
     correction = at.correction
     warnings = _of_range(at.temperatures, correction)
     unknown = [name for name, axis in zip("xyz", correction.axes, strict=True) if not axis.covariance]

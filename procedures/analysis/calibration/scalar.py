@@ -69,11 +69,11 @@ class ScalarFit:
 
     @property
     def p_value(self) -> float | None:
-        """Chance of a chi-square at least as large, where it can be judged."""
+        """Probability of a chi-square at least as large; None where it cannot be judged."""
         return judged_p_value(self.chi_square, self.degrees_of_freedom, self.noise_known)
 
     def calibration(self, triad: str, output_unit: str, input_unit: str) -> TriadCalibration:
-        """Convert to ``U = b + K·v`` with K upper triangular; its lower triangle is fixed and has no variance."""
+        """Return ``U = b + K·v`` with K upper triangular; its lower triangle is fixed and has no variance."""
         jacobian = _linear_derivative(self.parameters)
         covariance = jacobian @ self.covariance @ jacobian.T
         coefficients = linear_coefficients(self.parameters)
@@ -81,13 +81,13 @@ class ScalarFit:
 
 
 def correction_matrix(parameters: Array) -> Array:
-    """T·S of the nine parameters, shape (3, 3)."""
+    """Return T·S of the nine parameters, shape (3, 3)."""
     t_xy, t_xz, t_yz = parameters[6:]
     return np.array([[1.0, t_xy, t_xz], [0.0, 1.0, t_yz], [0.0, 0.0, 1.0]]) * parameters[3:6]
 
 
 def linear_coefficients(parameters: Array) -> Array:
-    """The twelve of ``U = b + K·v``, K = (T·S)⁻¹, in the order of `COEFFICIENT_NAMES`, shape (12,)."""
+    """Return the twelve of ``U = b + K·v``, K = (T·S)⁻¹, in the order of `COEFFICIENT_NAMES`, shape (12,)."""
     matrix = np.triu(np.linalg.inv(correction_matrix(parameters)))
     return np.asarray(np.column_stack([parameters[:3], matrix]), dtype=np.float64).ravel()
 
@@ -119,7 +119,7 @@ def scalar_parameters(coefficients: Array) -> Array:
 
 
 def observable_derivative(coefficients: Array) -> Array:
-    """∂(nine)/∂(twelve) of `scalar_parameters`, by central differences, shape (9, 12)."""
+    """Return ∂(nine)/∂(twelve) of `scalar_parameters`, by central differences, shape (9, 12)."""
     matrix = coefficients.reshape(3, 4)[:, 1:]
     step = 1e-6 * float(np.linalg.norm(matrix)) * np.eye(12)
     derivative = [(scalar_parameters(coefficients + h) - scalar_parameters(coefficients - h)) / 2.0 for h in step]
@@ -127,7 +127,8 @@ def observable_derivative(coefficients: Array) -> Array:
 
 
 def require_scalar_determined(what: str, directions: Array, tolerance: float = RANK_TOLERANCE) -> float:
-    """Condition number of thesis 3.23 for unit vectors (n, 3), or `Undetermined` naming the lost combinations.
+    """Return the condition number of thesis 3.23 for unit vectors (n, 3). Raises `Undetermined` naming the lost
+    combinations.
 
     Row: ``[g_x g_y g_z g_x² g_y² g_z² g_x·g_y g_x·g_z g_y·g_z]`` (thesis 3.21).
     """
@@ -185,12 +186,14 @@ def fit_scalar(
 
 
 def nominal_start(reference_scale: float = 1.0) -> Array:
-    """First guess for outputs in nominal SI units, shape (9,)."""
+    """Return the first guess of the nine parameters for outputs in nominal SI units, shape (9,)."""
     return np.array([0.0] * 3 + [reference_scale] * 3 + [0.0] * 3)
 
 
 def start_from_data(outputs: Array, reference: float) -> Array:
-    """First guess for outputs of unknown scale: bias and scale from the extremes of each channel, shape (9,)."""
+    """Return the first guess for outputs of unknown scale: bias and scale from the extremes of each channel, shape
+    (9,).
+    """
     low, high = outputs.min(axis=0), outputs.max(axis=0)
     span = np.where(high > low, high - low, 1.0)
     return np.array([*(0.5 * (low + high)), *(2.0 * reference / span), 0.0, 0.0, 0.0])

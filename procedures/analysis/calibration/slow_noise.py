@@ -28,6 +28,6 @@ def slow_excess(batch_means: Array) -> Array:
 
 
 def slow_share(excess: Array, noise_covariance: Array) -> float:
-    """κ of the channel with the most slow noise: `excess` (n, 3) of the poses, `noise_covariance` (3, n, n)."""
+    """Return κ of the channel with the most slow noise: `excess` (n, 3) of the poses, `noise_covariance` (3, n, n)."""
     white = np.mean(np.diagonal(noise_covariance, axis1=1, axis2=2), axis=1)
     return float(np.max(SLOW * np.maximum(excess.mean(axis=0), 0.0) / white))

@@ -1,4 +1,4 @@
-"""Reduce one recording a station to one mean output a channel, with its scatter as observed within the dwell."""
+"""Reduces one recording a station to one mean output a channel, with its scatter as observed within the dwell."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -96,7 +96,7 @@ def require_unit_of(calibration: TriadCalibration, means: StationMeans) -> None:
 
 
 def launch_warnings(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Warning where the recordings are of several launches of the unit, which an analysis takes for one."""
+    """Return a warning where the recordings are of several launches of the unit, which an analysis takes for one."""
     launches = {r.info.launched_s for r in recordings if r.info.launched_s is not None}
     if len(launches) < 2:
         return ()

@@ -39,7 +39,9 @@ def mean_covariance(noise: NoiseCoefficients, windows: ArrayLike) -> Array:
 
 
 def triad_covariance(record: TriadRecord | None, windows: ArrayLike) -> Array | None:
-    """`mean_covariance` of the three channels, shape (3, n, n), or None where some channel's noise is not known."""
+    """Return `mean_covariance` of the three channels, shape (3, n, n), or None where some channel's noise is not
+    known.
+    """
     if record is None:
         return None
     covariance = np.array([mean_covariance(noise, windows) for noise in record.noise])
@@ -47,7 +49,7 @@ def triad_covariance(record: TriadRecord | None, windows: ArrayLike) -> Array | 
 
 
 def outputs_covariance(record: TriadRecord | None, output_unit: str, windows: ArrayLike) -> Array | None:
-    """`triad_covariance` of outputs in their unit; None for counts too: a record has no noise in them."""
+    """Return `triad_covariance` of outputs in their unit; None for counts too: a record has no noise in them."""
     return None if output_unit == "count" else triad_covariance(record, windows)
 
 

@@ -21,7 +21,7 @@ COARSE_DWELLS_S = (*(10.0**k for k in range(-2, 9)), LONGEST_DWELL_S)
 
 
 def move_time_s(start: TableAngles, stop: TableAngles, axes: Sequence[tuple[float, float]]) -> float:
-    """Least time to move the table from rest to rest [s]; its axes turn together, the slowest counts.
+    """Return the least time to move the table from rest to rest [s]; its axes turn together, the slowest counts.
 
     `axes` are (rate_deg_s, acceleration_deg_s2) of outer, middle, inner.
     """

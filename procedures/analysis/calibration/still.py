@@ -64,7 +64,9 @@ def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | No
 
 
 def moving_variance(samples: Array, width: int) -> Array:
-    """Sample variance in a centred window of `width` samples, shape of `samples`; at the ends of what is there."""
+    """Return the sample variance in a centred window of `width` samples, shape of `samples`; at the ends of what is
+    there.
+    """
     centred = samples - samples.mean(axis=0)
     n = len(samples)
     sums = np.vstack([np.zeros(samples.shape[1]), np.cumsum(centred, axis=0)])
@@ -93,6 +95,6 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
 
 
 def pose_excess(samples: Array, stretches: tuple[Stretch, ...], batches: int = 12) -> Array:
-    """Excess variance of every stretch's mean due to slow noise (`slow_excess`), shape (poses, 3)."""
+    """Return the excess variance of every stretch's mean due to slow noise (`slow_excess`), shape (poses, 3)."""
     parts = (np.array_split(samples[p.start : p.stop], batches) for p in stretches)
     return np.array([slow_excess(np.array([part.mean(axis=0) for part in pose])) for pose in parts]).reshape(-1, 3)

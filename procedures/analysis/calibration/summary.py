@@ -10,7 +10,6 @@ from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.misfit import residual_misfit
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
-from procedures.analysis.calibration.suspect_flaw import suspect
 from procedures.analysis.calibration.verification import Magnitudes
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, coefficient_unit
@@ -63,7 +62,7 @@ class ScalarCheck:
 
 @dataclass(frozen=True)
 class TriadSummary:
-    """Complete calibration results of one triad."""
+    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets. JSON-ready."""
 
     calibration: TriadCalibration
     coefficients: tuple[Coefficient, ...]
@@ -83,7 +82,7 @@ class TriadSummary:
     """Station and channel with the greatest residual."""
     left_out: Magnitudes | None = None
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
-    suspect: str = ""
+    suspect: str = ""  # by `triad_analysis.suspected`, from all triads of the same stations
     """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
     budgets: tuple[Budget, ...] = ()
     """Uncertainty budget of each coefficient; empty in results of older versions."""
@@ -102,7 +101,9 @@ def triad_summary(
     slow: float = 0.0,
     left_out: Magnitudes | None = None,
 ) -> TriadSummary:
-    """Numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not known."""
+    """Return the numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not
+    known.
+    """
     misfit = residual_misfit(fit.residuals, fit.residual_sd, fit.chi_square, fit.degrees_of_freedom, labels, slow)
     return TriadSummary(
         fit.calibration(),
@@ -122,7 +123,6 @@ def triad_summary(
         misfit.ratio,
         misfit.worst,
         left_out,
-        "" if fit.free is None else suspect(fit.free, labels),
     )
 
 

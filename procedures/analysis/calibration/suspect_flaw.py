@@ -49,7 +49,9 @@ class FreeResiduals:
 
 
 def free_residuals(free: Array, covariance: Array, basis: Array, matrix: Array, table: TableErrors) -> FreeResiduals:
-    """The residuals `free` (k,) of a fit in an orthonormal `basis` (n, k/3) of what its design leaves open."""
+    """Return the residuals `free` (k,) of a fit in an orthonormal `basis` (n, k/3) of what its design leaves open, with
+    the effects of flaws.
+    """
     of_outputs = np.einsum("cj,njp->ncp", matrix, table.sensitivity)
     effect = np.einsum("nk,ncp->ckp", basis, of_outputs)
     return FreeResiduals(free, covariance, effect.reshape(len(free), -1), table.source)

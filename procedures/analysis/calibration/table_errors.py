@@ -51,11 +51,11 @@ class TableErrors:
     """Repeatability of the unit's seat about each of its axes: common to all stations, so it is in no column."""
 
     def of_outputs(self, matrix: Array) -> Array:
-        """Change of the outputs per standard deviation of each flaw, ``K·∂v/∂p·σ_p``, shape (n, 3, P)."""
+        """Return the change of the outputs per standard deviation of each flaw, ``K·∂v/∂p·σ_p``, shape (n, 3, P)."""
         return np.einsum("cj,njp->ncp", matrix, self.sensitivity * self.sd)
 
     def columns(self, source: str) -> NDArray[np.bool_]:
-        """Mask of the columns that belong to a source, boolean of shape (P,)."""
+        """Return the mask of the columns that belong to a source, boolean of shape (P,)."""
         return np.array([s == source for s in self.source], dtype=bool)
 
 

@@ -50,7 +50,9 @@ def analyse_triad(
     with_scalar: bool = False,
     weighting: Weighting = "noise_and_table",
 ) -> TriadSummary:
-    """Calibrate one triad from one recording a station. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    """Return the calibration of one triad from one recording a station. Raises `UnfitRecording`, `MissingChannel`,
+    `Undetermined`.
+    """
     means = station_means(recordings, triad)
     return analyse_means(means, site, uncertainty, record, with_scalar, weighting)[0]
 
@@ -63,7 +65,9 @@ def analyse_gyros(
     weighting: Weighting = "noise_and_table",
     correction: GyroThermalCorrection | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
-    """Calibrate the gyros, by a correction for temperature first where there is one. Raises as `analyse_triad`."""
+    """Return the calibration of the gyros, by a correction for temperature first where there is one. Raises as
+    `analyse_triad`.
+    """
     means, more = station_means(recordings, "gyro"), dict[str, Array]()
     if correction is not None:
         means, more["thermal correction"] = gyros_at_reference(recordings, means, correction)
@@ -131,7 +135,9 @@ LEAST_SCATTER = 0.5
 
 @dataclass(frozen=True)
 class AccelerometerSettings:
-    """Settings of the accelerometers' calibration."""
+    """Settings of the accelerometers' calibration: scalar cross-check, weighting, thermal correction, lags of
+    sensors.
+    """
 
     with_scalar: bool = False
     weighting: Weighting = "noise_and_table"
@@ -213,7 +219,7 @@ def scatter_covariance(outputs: Array, sd: Array) -> Array:
 
 
 def station_angles(means: StationMeans) -> list[TableAngles]:
-    """Commanded table angles of every station, or `UnfitRecording` where one was taken without."""
+    """Return the commanded table angles of every station. Raises `UnfitRecording` where one was taken without."""
     for label, angles in zip(means.labels, means.angles, strict=True):
         if angles is None:
             raise UnfitRecording(f"recording {label} has no table angles: its orientation is not known")

@@ -46,12 +46,12 @@ class TriadVerification:
 
 
 def calibration_of(unit: Unit, triad: str) -> TriadCalibration:
-    """The unit's current calibration of a triad, which is verified. Raises `DomainError` without one."""
+    """Return the unit's current calibration of a triad, which is verified. Raises `DomainError` without one."""
     return unit.required_calibration(triad, "verify")
 
 
 def planned_covariance(plan: TriadPlan) -> Array | None:
-    """Covariance (n, n) of the errors to expect from a plan, or None where the noise is not known."""
+    """Return the covariance (n, n) of the errors to expect from a plan, or None where the noise is not known."""
     noise = plan.noise_covariance()
     calibration = calibration_of(plan.unit, plan.triad)
     record = plan.unit.triad(plan.triad)
@@ -59,7 +59,9 @@ def planned_covariance(plan: TriadPlan) -> Array | None:
 
 
 def planned_diagnosis(plan: TriadPlan, site: Site, uncertainty: TableUncertainty) -> TriadDiagnosis | None:
-    """Diagnosis of a plan whose residuals are all zero: what it could find; None where the noise is not known."""
+    """Return the diagnosis of a plan whose residuals are all zero: what it could find; None where the noise is not
+    known.
+    """
     noise, calibration = plan.noise_covariance(), calibration_of(plan.unit, plan.triad)
     if noise is None or calibration.model == "scalar" or calibration.output_unit == "count":
         return None
@@ -90,7 +92,9 @@ def verify_gyros(
     uncertainty: TableUncertainty = TableUncertainty(),
     correction: GyroThermalCorrection | None = None,
 ) -> TriadVerification:
-    """Verify the gyros, by a correction for temperature first where there is one. Raises as `verify_triad`."""
+    """Return the verification of the gyros, by a correction for temperature first where there is one. Raises as
+    `verify_triad`.
+    """
     means, more = station_means(recordings, "gyro"), None
     if correction is not None:
         means, more = gyros_at_reference(recordings, means, correction)

@@ -51,7 +51,7 @@ def magnitudes(
     labels: Sequence[str],
     expected_sd: Array | None = None,
 ) -> Magnitudes:
-    """Statistics of |U| and |K⁻¹(U − b)| over outputs (n, 3) against a reference magnitude [SI]."""
+    """Return the statistics of |U| and |K⁻¹(U − b)| over outputs (n, 3) against a reference magnitude [SI]."""
     after = np.linalg.norm(correct(outputs, calibration), axis=1)
     before = None if calibration.output_unit == "count" else np.linalg.norm(outputs, axis=1)
     sd_after = _sample_sd(after)

@@ -24,7 +24,7 @@ from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 
 @dataclass(frozen=True)
 class FittedTriad:
-    """Fit of one triad with its means and its misfit."""
+    """Fit of one triad with its means, its misfit, and the suspected mistake."""
 
     fit: FieldFit
     means: StationMeans
@@ -73,7 +73,7 @@ def _misfit(fit: FieldFit, means: StationMeans, noise: Array, known: bool) -> Mi
 
 
 def require_accelerometers(recordings: Sequence[Recording]) -> None:
-    """Refuse recordings of gyros alone, with the way out: `UnfitRecording`."""
+    """Refuse recordings of gyros alone, with the way out. Raises `UnfitRecording`."""
     for recording in recordings:
         names = {c.name for c in recording.info.channels}
         if names.isdisjoint(ACCELEROMETER) and names.issuperset(GYRO):

@@ -64,7 +64,7 @@ class FieldModel:
 
 @dataclass(frozen=True)
 class FieldFit:
-    """Bias and scale of three channels, and the tilt of the base."""
+    """Bias and scale of three channels, and the tilt of the base, with their covariance and the residuals."""
 
     bias: Array
     scale: Array
@@ -85,7 +85,7 @@ class FieldFit:
 
     @property
     def p_value(self) -> float | None:
-        """Chance of a chi-square at least as large, where it can be judged."""
+        """Probability of a chi-square at least as large; None where it cannot be judged."""
         return judged_p_value(self.chi_square, self.degrees_of_freedom, self.noise_known)
 
     @property
@@ -94,7 +94,7 @@ class FieldFit:
         return np.sqrt(np.diagonal(self.covariance)[3:6]) / np.abs(self.scale)
 
     def calibration(self, triad: str, output_unit: str, input_unit: str, cross_sd: float) -> TriadCalibration:
-        """Convert to ``U = b + K·v`` with K diagonal; the cross-couplings are zero with the spread declared."""
+        """Return ``U = b + K·v`` with K diagonal; the cross-couplings are zero with the spread declared."""
         coefficients = np.column_stack([self.bias, np.diag(self.scale)]).ravel()
         places = [0, 4, 8, 1, 6, 11]
         covariance = np.zeros((12, 12))

@@ -23,7 +23,9 @@ _STEP = 1e-6
 
 
 def field_vectors(positions_rad: Array, vector_r: Array, tilt: Tilt, tilt_rad: Array) -> Array:
-    """A constant vector (3,) in the unit's axes, shape (n, 3), at positions (n, 2) with the base off by (α₀, β₀)."""
+    """Return a constant vector (3,) in the unit's axes, shape (n, 3), at positions (n, 2) with the base off by (α₀,
+    β₀).
+    """
     alpha, beta = positions_rad[:, 0], positions_rad[:, 1]
     vector = vector_r
     if tilt == "base":
@@ -35,7 +37,7 @@ def field_vectors(positions_rad: Array, vector_r: Array, tilt: Tilt, tilt_rad: A
 
 
 def of_tilt(positions_rad: Array, vector_r: Array, tilt: Tilt, tilt_rad: Array) -> Array:
-    """∂v/∂(α₀, β₀), shape (n, 3, 2)."""
+    """Return ∂v/∂(α₀, β₀), the change of the inputs by the tilt of the base, shape (n, 3, 2)."""
     columns = [
         (
             field_vectors(positions_rad, vector_r, tilt, tilt_rad + step)
@@ -48,7 +50,9 @@ def of_tilt(positions_rad: Array, vector_r: Array, tilt: Tilt, tilt_rad: Array) 
 
 
 def of_settings(positions_rad: Array, vector_r: Array, tilt: Tilt, tilt_rad: Array) -> Array:
-    """∂v/∂(α_i, β_i) of each position's own angles, shape (n, 3, 2n): a position's columns are zero elsewhere."""
+    """Return ∂v/∂(α_i, β_i) of each position's own angles, shape (n, 3, 2n): a position's columns are zero
+    elsewhere.
+    """
     n = len(positions_rad)
     found = np.zeros((n, 3, 2 * n))
     for turn in range(2):
@@ -60,6 +64,6 @@ def of_settings(positions_rad: Array, vector_r: Array, tilt: Tilt, tilt_rad: Arr
 
 
 def of_azimuth(positions_rad: Array, vector_r: Array, tilt: Tilt, tilt_rad: Array) -> Array:
-    """∂v/∂(heading of the base), shape (n, 3): the whole arrangement turned about up."""
+    """Return ∂v/∂(heading of the base), shape (n, 3): the whole arrangement turned about up."""
     change = np.cross(np.array([0.0, 1.0, 0.0]), vector_r)
     return field_vectors(positions_rad, change, tilt, tilt_rad)

@@ -33,7 +33,7 @@ class FieldTriad:
 
 
 def field_summary(fitted: FittedTriad, cross_coupling_sd: float, estimated: bool) -> FieldTriad:
-    """Numbers of a fit, ready to be stored; `estimated` where the scale factor was."""
+    """Return the numbers of a fit, ready to be stored; `estimated` where the scale factor was."""
     fit, means = fitted.fit, fitted.means
     triad = means.triad
     return FieldTriad(

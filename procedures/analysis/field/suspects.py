@@ -24,7 +24,7 @@ POSITIONS_MAX = 60
 
 
 def suspected(outputs: Array, model: FieldModel) -> str:
-    """Warning about the likeliest mistake, empty where none explains the outputs (n, 3)."""
+    """Return a warning about the likeliest mistake; empty where none explains the outputs (n, 3)."""
     declared, upright = _line(outputs, model, model.positions_rad)
     tried = [(*_line(seen, model, positions), name) for positions, seen, name in _hypotheses(outputs, model)]
     sound = sorted((rms, name) for rms, positive, name in tried if positive)

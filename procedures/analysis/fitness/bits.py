@@ -29,7 +29,7 @@ class Bits:
 
     @property
     def changing(self) -> int:
-        """The bits that changed, as a mask of 32."""
+        """Mask of the bits that changed, of 32."""
         return int(self._or ^ self._and) & 0xFFFFFFFF
 
     @property
@@ -38,7 +38,7 @@ class Bits:
         return max((self.changing & -self.changing).bit_length() - 1, 0)
 
     def add(self, x: NDArray[np.int32], ones: np.int32, zeros: np.int32) -> None:
-        """Add samples (n,), with the OR `ones` and the AND `zeros` of them all."""
+        """Take in samples (n,), with the OR `ones` and the AND `zeros` of them all."""
         self._or, self._and = self._or | ones, self._and & zeros
         held = self._held()
         if not held and (self._levels >= SPREAD or not self.lowest):
@@ -50,15 +50,15 @@ class Bits:
                 self._crossings[bit] = self._crossings.get(bit, 0) + int(np.count_nonzero(flips >> np.uint32(bit + 1)))
 
     def stuck(self) -> dict[int, int]:
-        """The stuck bits, each with the value it is stuck at."""
+        """Return the stuck bits by number, each with the value at which it is stuck."""
         return {b: int(self._or) >> b & 1 for b in self._held() if self._crossings.get(b, 0) >= CROSSINGS}
 
     def coarse(self) -> int:
-        """Number of the lowest bits that never change although higher ones do."""
+        """Return the number of the lowest bits that never change although higher ones do."""
         return self.lowest if self._levels >= SPREAD else 0
 
     def remainder(self) -> int:
-        """The constant value of the lowest bits that never change."""
+        """Return the constant value of the lowest bits that never change."""
         return int(self._or) & ((1 << self.lowest) - 1)
 
     def _held(self) -> list[int]:

@@ -37,7 +37,7 @@ TRIES = 40
 
 @dataclass(frozen=True)
 class Change:
-    """One step in a series."""
+    """One step in a series: the index of the cell where it happens, and its height."""
 
     index: int
     """The first cell after the step."""
@@ -47,7 +47,7 @@ class Change:
 def changes(
     series: Array, floor: Array, uneven: Array | None = None, *, flat: bool = False, least: float | None = None
 ) -> list[list[Change]]:
-    """Steps of each row of `series` (channels, K), none smaller than its `floor` (channels,), in order.
+    """Return the steps of each row of `series` (channels, K), none smaller than its `floor` (channels,), in order.
 
     `uneven` (channels, K), at least 1: ratio of a row's noise at each cell to its usual noise; a gap counts the less.
     `least`: required gap in spreads. `flat`: the series does not drift, and means replace the lines, which makes the

@@ -27,7 +27,7 @@ FIRST = 4
 
 
 class Copies:
-    """Count the repeats, the changes of one step, and the larger ones of every channel."""
+    """Running counts of the repeats, the changes of one step, and the larger ones of every channel."""
 
     def __init__(self, channels: int) -> None:
         self.step = np.full(channels, np.inf)
@@ -41,7 +41,7 @@ class Copies:
         self._pieces = 0
 
     def add(self, d: Samples, resolution: Array) -> None:
-        """Add differences (channels, n); `resolution` [raw] of integer channels; 0 of others (least change)."""
+        """Take in differences (channels, n); `resolution` [raw] of integer channels; 0 of others (least change)."""
         stride = 1 if self._pieces < FIRST else STRIDE
         some = np.abs(d[:, self._pieces % stride :: stride].astype(np.float64))
         self._pieces += 1
@@ -67,15 +67,15 @@ class Copies:
         self._proven += np.where(proves, same, 0)
 
     def fine(self) -> NDArray[np.bool_]:
-        """Mask of the channels, (channels,), most of whose changes exceed a few of their steps."""
+        """Return the mask of the channels, (channels,), most of whose changes exceed a few of their steps."""
         return self._large > 0.5 * (self._looked - self._same)
 
     def by_chance(self, c: int) -> float:
-        """Share of samples that repeat the previous one by chance: half as many as change by one step."""
+        """Return the share of samples that repeat the previous one by chance: half as many as change by one step."""
         return float(self._one[c]) / max(2 * self._looked, 1)
 
     def copied(self, in_runs: Array) -> list[int]:
-        """Columns of the channels whose repeats are beyond what their changes allow.
+        """Return the columns of the channels whose repeats are beyond what their changes allow.
 
         `in_runs`: part of all samples (channels,) that repeat in long runs, which are judged elsewhere.
         """

@@ -76,7 +76,7 @@ class Edge:
             self.pairs += int(np.count_nonzero(at_extreme[len(at_extreme) - len(same) :] & same))
 
     def piles_up(self, repeats: int, count: int, other: "Edge") -> bool:
-        """True if the outermost level holds more samples than a tail can, beyond chance.
+        """Return whether the outermost level holds more samples than a tail can, beyond chance.
 
         A tail does not rise outwards: of the n samples at the outermost level and the fullest of the next three the
         former holds at most ``STEEPEST/(1 + STEEPEST)``, and of all levels that are kept `ALONE`, binomial.
@@ -112,7 +112,9 @@ def _at_least(k: int, n: int, p: float) -> float:
 
 
 def counted(x: Samples, low: int, high: int) -> Levels | None:
-    """All levels of integer samples (n,) between `low` and `high` with their counts; None unless they are few."""
+    """Return all levels of integer samples (n,) between `low` and `high` with their counts; None unless they are
+    few.
+    """
     if high - low >= FEW:
         return None
     if high - low < VERY_FEW:

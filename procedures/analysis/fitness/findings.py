@@ -57,7 +57,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class ChannelFitness:
-    """All findings of one channel; it is fit where there are none."""
+    """All findings of one channel; it is fit for analysis where there are none."""
 
     channel: str
     findings: tuple[Finding, ...]
@@ -112,7 +112,7 @@ class FitnessSettings:
 
 
 def require_fit(recording_id: str, fitness: Sequence[ChannelFitness]) -> tuple[str, ...]:
-    """The sentences of all warnings, each once. Raises `UnfitRecording` with those of all refusals."""
+    """Return the sentences of all warnings, each once. Raises `UnfitRecording` with those of all refusals."""
     refusals = _sentences(fitness, Severity.REFUSE)
     if refusals:
         raise UnfitRecording(f"recording {recording_id}: {'; '.join(refusals)}")

@@ -29,7 +29,7 @@ KEPT = 1000
 
 @dataclass(frozen=True)
 class Jump:
-    """One outlier or one step."""
+    """One outlier or one step: index of the sample, size, and the noise around it."""
 
     index: int
     """The outlying sample, or the first one after the step."""
@@ -40,7 +40,7 @@ class Jump:
 
 
 class Jumps:
-    """Outliers and steps of all channels of a recording, against noise estimated piece by piece."""
+    """Outliers and steps of all channels of a recording, sought piece by piece against the noise."""
 
     def __init__(self, channels: int) -> None:
         self.outlier_count = np.zeros(channels, np.int64)
@@ -50,7 +50,7 @@ class Jumps:
         self._noise_count = 0
 
     def add(self, piece: Piece, resolution: Array) -> None:
-        """Add one more piece; `resolution` [raw] of each integer channel, (channels,)."""
+        """Seek outliers and steps in one more piece; `resolution` [raw] of each integer channel, (channels,)."""
         differences = piece.differences
         noise = self._noise(piece.d)
         if not differences.shape[1]:

@@ -43,7 +43,9 @@ class CellLevels:
 
 
 class Levels:
-    """Gather the cells piece by piece; a cell never spans two pieces, and an incomplete last one is dropped."""
+    """Running levels and noise of cells, piece by piece; a cell never spans two pieces, and an incomplete last one is
+    dropped.
+    """
 
     def __init__(self, channels: int, count: int | None) -> None:
         """Start with no samples; `count`: the announced number of samples."""
@@ -69,7 +71,7 @@ class Levels:
             self._noise.append(some.reshape(len(x), cells, -1).mean(axis=2))
 
     def finish(self) -> CellLevels:
-        """The levels and the noise of all cells."""
+        """Return the levels and the noise of all cells. Call after the last piece."""
         means, noise = np.hstack(self._means), np.hstack(self._noise)
         group = -(-NOISE_SAMPLES * self._stride // self._size)
         used = noise.shape[1] // group * group

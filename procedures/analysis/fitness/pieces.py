@@ -58,7 +58,7 @@ class Piece:
 
 
 class Pieces:
-    """Cut blocks of samples into pieces."""
+    """Cuts blocks of samples into pieces of one size."""
 
     def __init__(self, channels: int) -> None:
         self._channels = channels
@@ -69,7 +69,9 @@ class Pieces:
         """Number of samples received so far."""
 
     def add(self, block: RawArray) -> Iterator[Piece]:
-        """Pieces that a further block of shape (n, channels) completes. Raises `BadParameter` for another shape."""
+        """Yield the pieces that a further block of shape (n, channels) completes. Raises `BadParameter` for another
+        shape.
+        """
         samples = _numbers(block, self._channels)
         buffer = self._buffer
         if buffer is None:
@@ -89,7 +91,9 @@ class Pieces:
                 self._history = self._filled = HISTORY
 
     def finish(self) -> Iterator[Piece]:
-        """The remaining samples as the last piece, which may be without new ones; no piece without any samples."""
+        """Yield the remaining samples as the last piece, which may be without new ones; no piece without any
+        samples.
+        """
         if self._buffer is not None and self._filled:
             yield self._piece(self._buffer, last=True)
 
@@ -128,7 +132,7 @@ def _differences(columns: Samples) -> Samples:
 
 
 def largest(values: Samples) -> Array:
-    """Largest magnitude of each row, (channels,); zeros for no columns."""
+    """Return the largest magnitude of each row, (channels,); zeros for no columns."""
     if not values.shape[1]:
         return np.zeros(len(values))
     return np.maximum(values.max(axis=1).astype(np.float64), -values.min(axis=1).astype(np.float64))

@@ -43,7 +43,7 @@ class Doubt:
 
 
 class Readings:
-    """Mean magnitudes of the readings of triads and single channels, over short bursts throughout the recording."""
+    """Running mean magnitudes of triads and single channels, over short bursts throughout the recording."""
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float) -> None:
         self._rate_hz = rate_hz
@@ -57,7 +57,7 @@ class Readings:
         self._pieces = 0
 
     def add(self, x: Samples) -> None:
-        """New samples of all channels, (channels, n)."""
+        """Take in new samples of all channels, (channels, n)."""
         if not x.shape[1]:
             return
         length = min(BURST, x.shape[1])
@@ -70,7 +70,9 @@ class Readings:
         self._pieces += 1
 
     def doubts(self, settings: FitnessSettings, mean: Array, noise: Array) -> dict[str, Doubt]:
-        """Doubts by channel name; `mean` and `noise`, the standard deviation of white noise, of each channel, raw."""
+        """Return doubts by channel name; `mean` and `noise`, the standard deviation of white noise, of each channel,
+        raw.
+        """
         if not self._pieces or not settings.at_rest:
             return self._temperatures() if self._pieces else {}
         return {**self._temperatures(), **self._gyros(settings, mean, noise), **self._accelerometers(settings)}
@@ -185,7 +187,7 @@ class Readings:
 
 
 def unlikely_rate(rate_hz: float) -> str | None:
-    """A sentence on a sampling rate that no inertial unit has, else None."""
+    """Return a sentence on a sampling rate that no inertial unit has, else None."""
     if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         return None
     return (

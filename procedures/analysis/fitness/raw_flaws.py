@@ -9,7 +9,7 @@ from procedures.core.recording import AROUND, INCREMENTS, Channel
 
 
 def length(name: str, seen: int, announced: int | None, settings: FitnessSettings) -> list[Finding]:
-    """Findings on too few samples, or another number than announced."""
+    """Return findings on too few samples, or another number than announced."""
     found: list[Finding] = []
     if seen < settings.least_samples:
         told = f"channel {name}: {seen} samples are too few, at least {settings.least_samples} are needed"
@@ -21,7 +21,7 @@ def length(name: str, seen: int, announced: int | None, settings: FitnessSetting
 
 
 def missing(name: str, count: int, first: int, words: Wording, settings: FitnessSettings) -> list[Finding]:
-    """Finding on samples that are no finite numbers."""
+    """Return the finding on samples that are no finite numbers; nothing where there are none."""
     if not count:
         return []
     severity = Severity.REFUSE if settings.gaps == "refuse" else Severity.WARN
@@ -34,7 +34,7 @@ def missing(name: str, count: int, first: int, words: Wording, settings: Fitness
 
 
 def is_constant(edges: tuple[Edge, Edge], missing_count: int, seen: int) -> bool:
-    """True if all samples that are numbers are equal."""
+    """Return whether all samples that are numbers are equal."""
     top, bottom = edges
     return seen >= 2 and missing_count < seen and top.extreme == bottom.extreme
 
@@ -42,7 +42,9 @@ def is_constant(edges: tuple[Edge, Edge], missing_count: int, seen: int) -> bool
 def constant(
     channel: Channel, value: float, is_integer: bool, words: Wording, settings: FitnessSettings
 ) -> list[Finding]:
-    """Finding on a channel of one value, which a channel of `AROUND` may have, as a counter among other stations."""
+    """Return the finding on a channel of one value, which a channel of `AROUND` may have, as a counter among other
+    stations.
+    """
     railed = is_integer and value in RAILS
     rail = ", the end of its range" if railed else ""
     begin = f"channel {channel.name}: the channel is constant, it reads {value:.9g}{rail}"
@@ -56,7 +58,9 @@ def constant(
 
 
 def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: int, words: Wording) -> list[Finding]:
-    """Findings on samples that pile up at the largest or smallest value, or at the end of a converter's range."""
+    """Return findings on samples that pile up at the largest or smallest value, or at the end of a converter's
+    range.
+    """
     found: list[Finding] = []
     for edge, other in (edges, edges[::-1]):
         value, count = edge.extreme, edge.count
@@ -75,7 +79,7 @@ def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: in
 
 
 def coarse_bits(name: str, bits: Bits, seen: int) -> list[Finding]:
-    """Findings on stuck bits and on a resolution coarser than one count."""
+    """Return findings on stuck bits and on a resolution coarser than one count."""
     found: list[Finding] = []
     for bit, value in bits.stuck().items():
         told = (
@@ -92,7 +96,7 @@ def coarse_bits(name: str, bits: Bits, seen: int) -> list[Finding]:
 
 
 def wrapped(channel: Channel, wrap: Wrap, words: Wording) -> list[Finding]:
-    """Finding on jumps through the whole of a range."""
+    """Return the finding on jumps through the whole of a range."""
     bits = round(wrap.size).bit_length() - 1
     times = "once" if wrap.count == 1 else f"{wrap.count} times"
     where = f"{times}, first at sample {words.at(wrap.first_index)}"

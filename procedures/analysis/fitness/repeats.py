@@ -16,7 +16,7 @@ SEVERAL = 5
 
 
 class Repeats:
-    """Rows that repeat the previous row in all channels."""
+    """Counts of rows that repeat the previous row in all channels."""
 
     def __init__(self, channels: int) -> None:
         self.zeros = np.zeros(channels, np.int64)
@@ -26,7 +26,9 @@ class Repeats:
         self.first_index = 0
 
     def add(self, same: Mask, zeros: Counts, start: int) -> None:
-        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and their start."""
+        """Take in the mask of repeats of the previous sample, (channels, n), their number by channel, and their
+        start.
+        """
         count = same.shape[1]
         rows: Mask = np.logical_and.reduce(same, axis=0)
         repeated = int(np.count_nonzero(rows))
@@ -37,7 +39,8 @@ class Repeats:
         self.pairs += count
 
     def held(self, in_runs: int, fine: NDArray[np.bool_]) -> list[int]:
-        """The channels that show by changing only together that rows are sent more than once; none, if they do not.
+        """Return the channels that show by changing only together that rows are sent more than once; none, if they do
+        not.
 
         `in_runs`: repeated rows in long runs, which are judged elsewhere. `fine` (channels,): those that change
         by more than a step or two; of others `SEVERAL` must agree, since a common cause of a few of them, a current or

@@ -32,7 +32,7 @@ SAME = 0.8
 
 @dataclass(frozen=True)
 class Run:
-    """Samples `first_index` … `first_index` + `length` − 1, each of which repeats the one before it."""
+    """Run of samples `first_index` … `first_index` + `length` − 1, each of which repeats the one before it."""
 
     first_index: int
     length: int
@@ -61,7 +61,7 @@ class Group:
 
 
 class Stalls:
-    """Gather the runs of all groups piece by piece."""
+    """Running search for runs of repeats, of all groups of channels, piece by piece."""
 
     def __init__(self, groups: Sequence[tuple[int, ...]], channels: int) -> None:
         """Start with no samples; `groups`: columns of channels, the larger groups first."""
@@ -73,7 +73,9 @@ class Stalls:
         self._seen = 0
 
     def add(self, same: Mask, zeros: NDArray[np.int64], start: int) -> None:
-        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and their start."""
+        """Take in the mask of repeats of the previous sample, (channels, n), their number by channel, and their
+        start.
+        """
         if not same.shape[1]:
             return
         self.repeats += zeros

@@ -30,7 +30,7 @@ FEW_SHARE = 1e-3
 
 
 class FitnessStream:
-    """Inspect a recording block by block; the findings do not depend on how it was cut into blocks."""
+    """Inspection of a recording block by block; the findings do not depend on how it was cut into blocks."""
 
     def __init__(
         self,
@@ -62,12 +62,12 @@ class FitnessStream:
         self._is_integer = False
 
     def add(self, block: RawArray) -> None:
-        """Add the next samples, shape (n, channels), int32 or float64. Raises `BadParameter` for another shape."""
+        """Inspect the next samples, shape (n, channels), int32 or float64. Raises `BadParameter` for another shape."""
         for piece in self._pieces.add(block):
             self._inspect(piece)
 
     def finish(self) -> tuple[ChannelFitness, ...]:
-        """The findings, channel by channel; no block may follow."""
+        """Return the findings, channel by channel; no block may follow."""
         for piece in self._pieces.finish():
             self._inspect(piece)
         words = Wording(self._pieces.seen, self._rate_hz)
@@ -84,7 +84,7 @@ class FitnessStream:
         return tuple(ChannelFitness(c.name, tuple(f)) for c, f in zip(self._channels, found, strict=True))
 
     def outliers(self) -> dict[int, list[Jump]]:
-        """The outliers of each column, where they are few enough to be omitted."""
+        """Return the outliers of each column, where they are few enough to be omitted."""
         return {c: jumps for c, jumps in enumerate(self._jumps.outliers) if jumps and self._few(c)}
 
     def _few(self, c: int) -> bool:
@@ -254,7 +254,7 @@ def _groups(channels: Sequence[Channel]) -> list[tuple[int, ...]]:
 
 
 def inspect(recording: Recording, settings: FitnessSettings | None = None) -> tuple[ChannelFitness, ...]:
-    """All findings of a recording, one pass over it."""
+    """Return all findings of a recording, channel by channel, from one pass over it."""
     info = recording.info
     stream = FitnessStream(info.channels, info.rate_hz, info.count, settings)
     for block in recording.blocks():

@@ -32,7 +32,9 @@ ROUNDING = 2.0
 
 
 def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Change]], list[list[Change]]]:
-    """Steps of the level (cells, raw) and of the noise (groups of cells, in the logarithm), channel by channel."""
+    """Return steps of the level (cells, raw) and of the noise (groups of cells, in the logarithm), channel by
+    channel.
+    """
     noise = cells.noise / WHITE
     usual = np.median(noise, axis=1) if noise.shape[1] else np.zeros(len(noise))
     fine = usual > LEAST_NOISE * resolution
@@ -55,7 +57,7 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
 
 
 def outliers(channel: Channel, jumps: Sequence[Jump], count: int, mended: bool, words: Wording) -> list[Finding]:
-    """Findings on single samples far from both neighbours; `mended`: the results are computed without them."""
+    """Return findings on single samples far from both neighbours; `mended`: the results are computed without them."""
     if not jumps:
         return []
     first = jumps[0]
@@ -74,7 +76,9 @@ def outliers(channel: Channel, jumps: Sequence[Jump], count: int, mended: bool, 
 def steps(
     channel: Channel, sharp: Sequence[Jump], gradual: Sequence[Change], size: int, words: Wording
 ) -> list[Finding]:
-    """Findings on shifts of the level: those visible in one sample, and those in means of cells of `size` samples."""
+    """Return findings on shifts of the level: those visible in one sample, and those in means of cells of `size`
+    samples.
+    """
     places = [(j.index, j.size, "sample") for j in sharp]
     for change in gradual:
         index = change.index * size
@@ -94,7 +98,7 @@ def steps(
 
 
 def noise_changes(channel: Channel, found: Sequence[Change], size: int, words: Wording) -> list[Finding]:
-    """Findings on changes of the noise; `size`: samples behind one value of it."""
+    """Return findings on changes of the noise; `size`: samples behind one value of it."""
     if not found:
         return []
     shown = "; ".join(
@@ -106,7 +110,7 @@ def noise_changes(channel: Channel, found: Sequence[Change], size: int, words: W
 
 
 def hung(group: Group, words: Wording) -> Finding:
-    """Finding on rows that repeat in a run."""
+    """Return the finding on rows that repeat in a run."""
     longest = max(group.runs, key=lambda run: run.length)
     told = (
         f"{longest.length} rows in a row repeat the one before exactly, from sample {words.at(longest.first_index)}: "
@@ -120,7 +124,7 @@ def hung(group: Group, words: Wording) -> Finding:
 
 
 def stands_still(group: Group, names: Sequence[str], words: Wording) -> Finding:
-    """Finding on one channel or triad that repeats in runs while others move."""
+    """Return the finding on one channel or triad that repeats in runs while others move."""
     longest = max(group.runs, key=lambda run: run.length)
     total, count = sum(run.length for run in group.runs), len(group.runs) + group.lost
     times = "once" if count == 1 else f"{count} times"
@@ -135,7 +139,7 @@ def stands_still(group: Group, names: Sequence[str], words: Wording) -> Finding:
 
 
 def copied(names: Sequence[str], repeats: int, alone: bool, words: Wording, settings: FitnessSettings) -> Finding:
-    """Finding on copied channels; `alone`: no other channel moves meanwhile."""
+    """Return the finding on copied channels; `alone`: no other channel moves meanwhile."""
     rate = words.rate_hz * (1.0 - repeats / max(words.seen - 1, 1))
     who = f"channel {names[0]}" if len(names) == 1 else f"channels {names[0]} … {names[-1]}"
     begin = f"{who}: {words.share(repeats)} repeat the one before exactly"

@@ -26,7 +26,7 @@ WRONG_TEMPERATURES = (Kind.WRAPPED, Kind.WRONG_UNIT, Kind.NOT_FINITE)
 
 @dataclass(frozen=True)
 class Inspection:
-    """Settings for the inspection of an analysis's recordings."""
+    """Settings for the inspection of an analysis's recordings: requirements, channels, temperatures."""
 
     settings: FitnessSettings = field(default_factory=FitnessSettings)
     channels: tuple[str, ...] | None = None
@@ -35,7 +35,7 @@ class Inspection:
     """True if the analysis depends on temperatures; otherwise impossible ones only cause warnings."""
 
     def matters(self, found: ChannelFitness, channel: Channel) -> ChannelFitness | None:
-        """The findings of a channel as far as they matter to the analysis."""
+        """Return the findings of a channel as far as they matter to the analysis; None where the channel does not."""
         if channel.quantity in (Quantity.TABLE_ANGLE, Quantity.TIME):
             return None
         if channel.quantity is not Quantity.TEMPERATURE:
@@ -46,7 +46,9 @@ class Inspection:
         return replace(found, findings=tuple(wrong))
 
     def of_station(self, station: Station | None) -> FitnessSettings:
-        """Requirements on one recording: a station may turn on purpose, or feed a current in place of gravity."""
+        """Return the requirements on one recording: a station may turn on purpose, or feed a current in place of
+        gravity.
+        """
         if station is None:
             return self.settings
         turns, fed = station.turn is not None or station.sinusoid is not None, station.current_ma is not None
@@ -95,11 +97,11 @@ class Watched:
         return self.fitness(), self._outliers
 
     def learn(self, seen: "Seen") -> None:
-        """Take over what the first pass of a copy of this recording has found."""
+        """Take over the findings of the first pass of a copy of this recording."""
         self._fitness, self._outliers = seen
 
     def fitness(self) -> tuple[ChannelFitness, ...]:
-        """The findings by channel; the recording is read for them unless an analysis has read it to the end."""
+        """Return the findings by channel; the recording is read for them unless an analysis has read it to the end."""
         if self._fitness is None:
             stream = self._stream()
             for block in self._recording.blocks():
@@ -192,7 +194,7 @@ class Watch:
 
     @classmethod
     def of(cls, watched: Watched) -> "Watch":
-        """Watch a single recording that is already a `Watched`."""
+        """Return a watch over a single recording that is already a `Watched`."""
         watch = cls((), Inspection())
         watch.recordings = (watched,)
         return watch
@@ -206,7 +208,9 @@ class Watch:
         raise UnfitRecording(alone + "; ".join(sentences))
 
     def warnings(self) -> tuple[str, ...]:
-        """Warnings on the recordings that were read; a recording that the analysis did not read does not count."""
+        """Return warnings on the recordings that were read; a recording that the analysis did not read does not
+        count.
+        """
         return self._told(Severity.WARN, [r for r in self.recordings if r.is_read])
 
     def mend(self) -> bool:

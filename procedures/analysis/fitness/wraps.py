@@ -32,7 +32,7 @@ class Wrap:
 
 
 class Wraps:
-    """Count the jumps of every channel by size."""
+    """Running counts of the jumps of every channel, by size."""
 
     def __init__(self, gains_k: list[float | None]) -> None:
         """Start with no samples; `gains_k`: kelvins per raw unit of each temperature channel, None for others."""
@@ -59,7 +59,7 @@ class Wraps:
                 self._count(c, row, piece.start + piece.x.shape[1] - len(row), gain)
 
     def found(self, c: int, low: float, high: float) -> Wrap | None:
-        """The wrap of a channel whose values lie between `low` and `high`, or None."""
+        """Return the wrap of a channel whose values lie between `low` and `high`, or None."""
         gain = self._gains[c]
         for size, count in zip(TEMPERATURE_K, self._kelvins[c].tolist(), strict=True):
             if gain is not None and count:

@@ -40,14 +40,18 @@ FEWEST_A_CELL = 8
 
 
 def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -> LaunchNoise:
-    """Analyse all channels but temperatures. Raises `UnfitRecording` (recording, channel, value) and `BadParameter`."""
+    """Return the noise of all channels but temperatures of one launch. Raises `UnfitRecording` (recording, channel,
+    value) and `BadParameter`.
+    """
     return analyse_launches([recording], [label], settings)[0]
 
 
 def analyse_launches(
     recordings: Sequence[Recording], labels: Sequence[str], settings: LaunchSettings
 ) -> tuple[LaunchNoise, ...]:
-    """Analyse each recording as `analyse_launch`; launches and channels are parts that `spread` may work out."""
+    """Return the noise of each recording as `analyse_launch` does; launches and channels are parts that `spread` may
+    compute at one time.
+    """
     names = [_names(recording.info) for recording in recordings]
     if len(recordings) == 1 and spread.width() > 1:
         firsts = [_first_in_two(recordings[0], names[0], settings)]

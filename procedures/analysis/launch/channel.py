@@ -53,7 +53,9 @@ def channel_noise(
     context: ChannelContext,
     settings: LaunchSettings,
 ) -> ChannelNoise:
-    """Analyse one channel completely; `fast` and `powers` come from every sample, None where the fast part is off."""
+    """Return the complete noise of one channel; `fast` and `powers` come from every sample, None where the fast part is
+    off.
+    """
     cell_s, series = cells.cell_s, signal.cells
     slow = _deviation(series, cell_s, settings)
     whole = slow if fast is None else joined(fast, slow)
@@ -103,7 +105,9 @@ def channel_noise(
 
 
 def joined(fast: Deviation, slow: Deviation) -> Deviation:
-    """One Allan deviation at the full rate: short cluster times from every sample, longer ones from the cells."""
+    """Return one Allan deviation at the full rate: short cluster times from every sample, longer ones from the
+    cells.
+    """
     later = slow.tau_s > fast.tau_s[-1] * (1.0 + 1e-9)
     factor = round(fast.rate_hz / slow.rate_hz)
 

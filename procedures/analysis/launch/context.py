@@ -35,12 +35,14 @@ class ChannelContext:
 
 
 def temperature_names(info: RecordingInfo) -> tuple[str, ...]:
-    """The names of the temperature channels."""
+    """Return the names of a recording's temperature channels."""
     return tuple(c.name for c in info.channels if c.quantity is Quantity.TEMPERATURE)
 
 
 def smooth_temperatures(cells: Cells, names: Sequence[str]) -> dict[str, Array]:
-    """Cell means of temperatures, averaged so that their reading noise matters little; constant ones are left out."""
+    """Return cell means of temperatures by name, averaged so that their reading noise matters little; constant ones are
+    left out.
+    """
     found: dict[str, Array] = {}
     for name, row in zip(cells.channels, cells.rates, strict=True):
         if name in names and np.all(np.isfinite(row)) and np.ptp(row) > 0.0:
@@ -50,7 +52,9 @@ def smooth_temperatures(cells: Cells, names: Sequence[str]) -> dict[str, Array]:
 
 
 def most_followed(series: Array, temperatures: dict[str, Array]) -> str | None:
-    """The temperature whose changes the series (n,) follows most, by correlation of successive group means."""
+    """Return the name of the temperature whose changes the series (n,) follows most, by correlation of successive group
+    means; None without any.
+    """
     size = max(1, len(series) // _GROUPS)
     count = len(series) // size
     if not temperatures or count < 3:
@@ -69,7 +73,7 @@ def most_followed(series: Array, temperatures: dict[str, Array]) -> str | None:
 
 
 class Resolution:
-    """Gather the variance of the first samples of channels that send whole counts."""
+    """Running variance of the first samples of channels that send whole counts."""
 
     def __init__(self, channels: Sequence[Channel]) -> None:
         self._channels = tuple(channels)
@@ -77,14 +81,14 @@ class Resolution:
         self._seen = 0
 
     def add(self, block: RawArray, columns: Sequence[int]) -> None:
-        """Add the next samples (n, …); `columns` are the indices of the channels."""
+        """Take in the next samples (n, …); `columns` are the indices of the channels."""
         if self._seen < LOOKED_AT:
             part = block[: LOOKED_AT - self._seen][:, list(columns)]
             self._parts.append(part)
             self._seen += len(part)
 
     def finish(self) -> dict[str, str]:
-        """A sentence for each channel whose noise is less than a count."""
+        """Return a sentence for each channel whose noise is less than a count, by its name."""
         if not self._parts or not np.issubdtype(self._parts[0].dtype, np.integer):
             return {}
         samples = np.concatenate(self._parts)

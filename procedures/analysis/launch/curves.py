@@ -45,7 +45,7 @@ def bands(
     step_decades: float,
     intervals: int,
 ) -> list[BandCurve]:
-    """Bands of channels in one pass: over all starts, or of sampled intervals. Raises `UnfitRecording`."""
+    """Return the bands of channels in one pass: over all starts, or of sampled intervals. Raises `UnfitRecording`."""
     info = recording.info
     columns = [info.column(name) for name in names]
     channels = [info.channels[c] for c in columns]

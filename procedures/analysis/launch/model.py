@@ -42,7 +42,7 @@ class FoundNoise:
         return None if g is None else CorrelatedProcess(g.time_s, g.time_sd_s, g.driving, g.driving_sd, g.sd)
 
     def warnings(self, rate_unit: str) -> tuple[str, ...]:
-        """Warnings to read before a coefficient is trusted."""
+        """Return warnings to read before a coefficient is trusted."""
         unit, size = DEVIATION_DISPLAY[rate_unit]
         found = [self.coarse] if self.coarse else list[str]()
         lines = [] if self.coarse else sorted(self.fit.lines, key=lambda line: -line.amplitude)
@@ -84,7 +84,9 @@ class FoundNoise:
 def found_noise(
     signal: CleanSignal, cells: Cells, powers: Powers | None, context: ChannelContext, settings: LaunchSettings
 ) -> FoundNoise:
-    """Fit the noise of a channel's clean cells, with the likeliest temperature and shift of the level as regressors."""
+    """Return the noise fitted to a channel's clean cells, with the likeliest temperature and shift of the level as
+    regressors.
+    """
     series, cell_s = signal.cells, cells.cell_s
     temperatures = {name: row[signal.first_cell :] for name, row in context.temperatures.items()}
     followed = most_followed(series, {n: row for n, row in temperatures.items() if np.ptp(row) > 0.0})

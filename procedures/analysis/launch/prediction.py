@@ -70,7 +70,7 @@ def predicted_noise(
 
 
 def unresolved_noise(channel: str, noise: NoiseCoefficients, duration_s: float) -> list[str]:
-    """A sentence for each process that one launch is too short to distinguish from the others."""
+    """Return a sentence for each process that one launch is too short to distinguish from the others."""
     shown = units.NOISE_DISPLAY["rad/s" if channel in GYRO else "m/s^2"]
     sentences: list[str] = []
     for p in predicted_noise(channel, noise, duration_s):

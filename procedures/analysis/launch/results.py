@@ -215,7 +215,7 @@ class ChannelNoise:
     """Root mean square above 1 Hz; None where the launch was not sampled so fast, or in earlier versions."""
 
     def coefficient(self, process: str) -> Coefficient:
-        """The coefficient of one of the five processes."""
+        """Return the coefficient of one of the five processes, by its name."""
         return self.coefficients[PROCESSES.index(process)]
 
     @property

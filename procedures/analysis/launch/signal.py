@@ -42,12 +42,14 @@ class CleanSignal:
 
     @property
     def cells(self) -> Array:
-        """The series to analyse, (n,) [rate]."""
+        """Cleaned series to analyse, (n,) [rate]."""
         return self.steps[-1].cells
 
 
 def clean_signal(channel: str, cells: Array, cell_s: float, start_s: float, settings: LaunchSettings) -> CleanSignal:
-    """Trim the warm-up as set, then subtract F(t) − F(t₀) (thesis 3.1.3); `start_s` since the launch."""
+    """Return the series with the warm-up trimmed as set, and F(t) − F(t₀) subtracted (thesis 3.1.3); `start_s` since
+    the launch.
+    """
     is_accelerometer = channel in ACCELEROMETER
     steps = [Step("as recorded", cells)]
     findings: list[str] = []

@@ -14,7 +14,7 @@ FEWEST_A_CELL = 8
 
 
 def densities(recording: Recording, names: Sequence[str], confidence: float) -> list[Density | None]:
-    """Densities of channels in one pass, None of a recording that is too short for one.
+    """Return the densities of channels in one pass, None of a recording that is too short for one.
 
     Raises `MissingChannel`, `UnfitRecording` for samples that are not numbers.
     """

@@ -36,7 +36,7 @@ class ChannelSummary:
     """Sample standard deviation (n − 1) of the mean rate over the launches; None for a single launch."""
 
     def mean(self, process: str) -> MeanCoefficient:
-        """The mean coefficient of one of the five processes."""
+        """Return the mean coefficient of one of the five processes, by its name."""
         return self.means[PROCESSES.index(process)]
 
     @property
@@ -51,7 +51,9 @@ class ChannelSummary:
         return tuple(m.process for m in self.means if m.mean is None)
 
     def noise_over(self, known: NoiseCoefficients | None) -> NoiseCoefficients:
-        """Coefficients for a unit's record; one that the model does not describe keeps its `known` value, or limit."""
+        """Return the coefficients for a unit's record; one that the model does not describe keeps its `known` value, or
+        limit.
+        """
         changed: dict[str, float] = {}
         for m in self.means:
             if m.mean is None and not all(reading.described for reading in m.values):
@@ -61,7 +63,9 @@ class ChannelSummary:
 
 
 def summarise(launches: Sequence[LaunchNoise]) -> tuple[ChannelSummary, ...]:
-    """Summarise each channel, in the order of the first launch; a channel must be in every launch."""
+    """Return the summary of each channel over all launches, in the order of the first launch; a channel must be in
+    every launch.
+    """
     found: list[ChannelSummary] = []
     for index, first in enumerate(launches[0].channels):
         channels = [launch.channels[index] for launch in launches]

@@ -43,7 +43,9 @@ class TemperatureCorrelation:
 
 
 def correlations(series: Array, temperatures: Mapping[str, Array], cell_s: float) -> tuple[TemperatureCorrelation, ...]:
-    """Correlations of cells (n,) with every temperature of the launch, (n,) each; none if there are too few cells."""
+    """Return the correlations of cells (n,) with every temperature of the launch, (n,) each; none if there are too few
+    cells.
+    """
     size = max(1, min(round(GROUP_S / cell_s), len(series) // FEWEST), -(-len(series) // MOST_GROUPS))
     count = len(series) // size
     if count < FEWEST:
@@ -111,14 +113,16 @@ WITHIN_HZ = 0.15
 
 
 def folded_hz(frequency_hz: float, rate_hz: float) -> float:
-    """The frequency at which samples at a rate show a sine, 0 … half of the rate."""
+    """Return the frequency at which samples at a rate show a sine, 0 … half of the rate [Hz]."""
     return abs(frequency_hz - rate_hz * round(frequency_hz / rate_hz))
 
 
 def with_origins(
     lines: Sequence[SpectralLine], channel: str, dither_hz: Sequence[float], rate_hz: float
 ) -> tuple[SpectralLine, ...]:
-    """The lines with their origins: the channel's own dither, another gyro's (cross-talk), a multiple, or none."""
+    """Return the lines with their origins: the channel's own dither, another gyro's (cross-talk), a multiple, or
+    none.
+    """
     return tuple(replace(line, origin=_origin(line.frequency_hz, channel, dither_hz, rate_hz)) for line in lines)
 
 

@@ -7,7 +7,7 @@ from procedures.core.arrays import Array
 
 
 def chi_square(errors: Array, covariance: Array) -> float:
-    """``χ² = eᵀC⁻¹e`` of errors (n,) with covariance (n, n); zero of no errors."""
+    """Return ``χ² = eᵀC⁻¹e`` of errors (n,) with covariance (n, n); zero of no errors."""
     if len(errors) == 0:
         return 0.0
     whitened = whitener(covariance) @ errors
@@ -15,12 +15,14 @@ def chi_square(errors: Array, covariance: Array) -> float:
 
 
 def tail_probability(statistic: float, degrees_of_freedom: int) -> float:
-    """Chance of a chi-square at least as large."""
+    """Return the probability of a chi-square at least as large, with these degrees of freedom."""
     return float(chdtrc(degrees_of_freedom, statistic))
 
 
 def residual_factor(statistic: float, degrees_of_freedom: int, noise_known: bool) -> float:
-    """Factor on the noise's covariance that makes the residuals likely: χ²/ν, never under one, one of known noise."""
+    """Return the factor on the noise's covariance that makes the residuals likely: χ²/ν, never under one, one of known
+    noise.
+    """
     return 1.0 if noise_known or degrees_of_freedom == 0 else max(1.0, statistic / degrees_of_freedom)
 
 

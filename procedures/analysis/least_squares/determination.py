@@ -1,4 +1,6 @@
-"""Test whether a set of orientations determines the unknowns, before any solve; the answer names what is lost."""
+"""Test whether a set of orientations determines the unknowns, before any solve; the error names the lost
+combinations.
+"""
 
 from collections.abc import Sequence
 

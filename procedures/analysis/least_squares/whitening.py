@@ -17,7 +17,7 @@ def whitener(covariance: Array) -> Array:
 
 
 def whiteners(covariances: Array) -> Array:
-    """`whitener` of each of several covariances at once, shape (k, n, n)."""
+    """Return the `whitener` of each of several covariances at once, shape (k, n, n)."""
     size = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     factors = np.linalg.cholesky(covariances / (size[:, :, None] * size[:, None, :]))
     return np.asarray(np.linalg.inv(factors), dtype=np.float64) / size[:, None, :]

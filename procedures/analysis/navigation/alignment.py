@@ -42,7 +42,7 @@ class InitialAttitude:
 
 
 def rotation_nb(heading_rad: float, pitch_rad: float, roll_rad: float) -> Array:
-    """``rot_nb = R_y(−heading)·R_z(pitch)·R_x(roll)``, shape (3, 3)."""
+    """Return ``rot_nb = R_y(−heading)·R_z(pitch)·R_x(roll)``, shape (3, 3), for angles in radians."""
     return Rotation.from_euler("YZX", [-heading_rad, pitch_rad, roll_rad]).as_matrix()
 
 
@@ -131,7 +131,9 @@ class ThesisPrediction:
 
 
 def thesis_prediction(unit: Unit, site: Site, base_turn_arcsec: float, alignment_s: float) -> ThesisPrediction | None:
-    """Thesis 1.1 with the noisiest channel of each triad, since any may look east; None where noise is not known."""
+    """Return thesis 1.1 with the noisiest channel of each triad, since any may look east; None where noise is not
+    known.
+    """
     if unit.gyro is None or unit.accelerometer is None:
         return None
     added, independent = azimuth_error(

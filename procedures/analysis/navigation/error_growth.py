@@ -51,7 +51,7 @@ class Alignment:
 
 @dataclass(frozen=True)
 class Growth:
-    """Covariance of the navigator's errors over time."""
+    """Covariance of the navigator's errors over time, (m, 9, 9) by source."""
 
     time_s: Array
     """Times from zero on, shape (m,)."""
@@ -60,7 +60,7 @@ class Growth:
 
     @property
     def total(self) -> Array:
-        """Sum over the independent sources, shape (m, 9, 9)."""
+        """Sum of the covariances over the independent sources, shape (m, 9, 9)."""
         return np.sum(list(self.by_source.values()), axis=0)
 
 
@@ -96,7 +96,9 @@ def error_growth(
 
 
 def constant_error(place: Place, alignment: Alignment, inputs: Array, duration_s: float) -> Array:
-    """Errors (9,) after `duration_s` of constant sensor errors (6,) in level axes: gyros, then accelerometers."""
+    """Return the errors (9,) after `duration_s` of constant sensor errors (6,) in level axes: gyros, then
+    accelerometers.
+    """
     grid = responses(place, duration_s, 1)
     return _responses_to_constants(place, grid, alignment)[-1] @ inputs
 

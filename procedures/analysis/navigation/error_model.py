@@ -57,7 +57,7 @@ class Place:
 
     @property
     def metres(self) -> Array:
-        """Metres north and east per state, shape (2, 9)."""
+        """Metres north and east per unit of each state, shape (2, 9)."""
         scale = np.zeros((2, 9))
         scale[0, LATITUDE] = self.radius_m
         scale[1, LONGITUDE] = self.radius_m * np.cos(self.latitude_rad)
@@ -95,7 +95,7 @@ def dynamics(place: Place) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Responses:
-    """Responses of the navigator on an even grid of n + 1 times from zero on."""
+    """Responses of the navigator to inputs, on an even grid of n + 1 times from zero on."""
 
     step_s: float
     transition: Array
@@ -110,7 +110,9 @@ class Responses:
 
 
 def responses(place: Place, duration_s: float, steps: int) -> Responses:
-    """Exact over each step for an input constant in it: ``exp([F B; 0 0]·Δt)`` (Van Loan 1978)."""
+    """Return the responses over `duration_s` in `steps`, exact for an input constant in each step: ``exp([F B; 0
+    0]·Δt)`` (Van Loan 1978).
+    """
     f, b = dynamics(place)
     step = duration_s / steps
     whole = expm(np.block([[f, b], [np.zeros((6, 15))]]) * step)

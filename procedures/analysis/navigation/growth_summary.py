@@ -31,7 +31,9 @@ class Curve:
 
 
 def curves(place: Place, growth: Growth) -> tuple[Curve, ...]:
-    """Standard deviations of position [m], velocity [m/s] and attitude [rad]; height where it is free."""
+    """Return the standard deviations of position [m], velocity [m/s] and attitude [rad] as curves; height where it is
+    free.
+    """
     sd = np.sqrt(np.maximum(np.diagonal(growth.total, axis1=1, axis2=2), 0.0))
     east = place.radius_m * float(np.cos(place.latitude_rad))
     told = [
@@ -49,18 +51,20 @@ def curves(place: Place, growth: Growth) -> tuple[Curve, ...]:
 
 
 def radius_95(place: Place, covariance: Array) -> float:
-    """Circle [m] about the true place that holds 95 % of the positions, from the errors' covariance (9, 9)."""
+    """Return the radius [m] of the circle about the true place that holds 95 % of the positions, from the errors'
+    covariance (9, 9).
+    """
     return radius_containing(0.95, place.metres @ covariance @ place.metres.T)
 
 
 def greatest(growth: Growth) -> tuple[float, float]:
-    """Greatest standard deviation of the tilts and of the heading over the whole time [rad]."""
+    """Return the greatest standard deviation of the tilts and of the heading over the whole time [rad]."""
     sd = np.sqrt(np.maximum(np.diagonal(growth.total, axis1=1, axis2=2), 0.0)).max(axis=0)
     return float(max(sd[TILT_NORTH], sd[TILT_EAST])), float(sd[HEADING])
 
 
 def sentence(radius_m: float, own_m: float | None, uncalibrated_m: float | None, linear: bool) -> str:
-    """The benefit of the calibration in one sentence."""
+    """Return the benefit of the calibration in one sentence."""
     said = f"After one hour parked, the position is within {radius_m:.3g} m of the truth with 95 %"
     if own_m is None:
         return said + "."
@@ -71,7 +75,7 @@ def sentence(radius_m: float, own_m: float | None, uncalibrated_m: float | None,
 
 
 def warnings(gyro: TriadErrors, accelerometer: TriadErrors, has_launch: bool) -> tuple[str, ...]:
-    """Warnings on contributions missing from the figures."""
+    """Return warnings on contributions that are missing from the figures."""
     found = [
         f"the noise of the {name} triad is not known and counts as none"
         for name, errors in (("gyro", gyro), ("accelerometer", accelerometer))

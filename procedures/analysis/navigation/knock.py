@@ -35,7 +35,7 @@ NORMAL = 1.4826
 
 @dataclass(frozen=True)
 class AttitudeStep:
-    """The greatest step of the attitude in a recording."""
+    """The greatest step of the attitude in a recording: size, time, whether it is detected, and by which sensors."""
 
     seen: bool
     """True if the step exceeds the noise."""
@@ -49,7 +49,7 @@ class AttitudeStep:
 
 
 def attitude_step(recording: Recording, calibrations: dict[str, TriadCalibration]) -> AttitudeStep | None:
-    """The greatest step, detected or not; None for a recording of too few samples."""
+    """Return the greatest step of the attitude, detected or not; None for a recording of too few samples."""
     info = recording.info
     per_cell = max(1, info.count // CELLS)
     if info.count // per_cell < CELLS_MIN:
@@ -96,5 +96,5 @@ def _deviation(values: Array) -> Array:
 
 
 def step_degrees(step: AttitudeStep | None) -> float:
-    """Size of a detected step [deg], zero where there is none."""
+    """Return the size of a detected step [deg], zero where there is none."""
     return step.size_rad / units.DEG if step is not None and step.seen else 0.0

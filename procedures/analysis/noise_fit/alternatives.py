@@ -45,7 +45,7 @@ class _Fit:
 
 @dataclass(frozen=True)
 class Doubt:
-    """The alternative explanation of the slow noise."""
+    """Alternative explanation of the slow noise, and the estimates with the intervals that it widens."""
 
     estimates: dict[int, Estimate]
     """Estimates by process, with intervals that allow for the alternative."""

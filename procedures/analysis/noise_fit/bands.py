@@ -29,7 +29,7 @@ _SLOW_PART = 0.2
 
 @dataclass(frozen=True)
 class Agreement:
-    """The bins to fit, and remarks on the excluded ones."""
+    """Bins to fit, the model that they need, and remarks on the excluded bins."""
 
     joined: Joined
     remarks: tuple[str, ...]
@@ -47,7 +47,7 @@ class Agreement:
 
 
 def agreed(slow: Powers, fast: Powers | None) -> Agreement:
-    """Select the bins to fit and the model they need, with remarks on the excluded bins. Raises `UnfitRecording`."""
+    """Return the bins to fit and the model they need, with remarks on the excluded bins. Raises `UnfitRecording`."""
     ways = _ways(slow, fast)
     found, state = _first_that_fits(ways)
     base = ways[-1].joined.below(_SLOW_PART / slow.period_s) if found is None else found.joined

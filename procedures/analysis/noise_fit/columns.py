@@ -102,7 +102,9 @@ def free_ended_quantization(count: int, cell_s: float) -> Array:
 
 
 def sine_edged_taper(count: int, edge: int) -> Array:
-    """Weights (count,) that rise as a sine over `edge` and fall likewise; squares of overlapped neighbours add to 1."""
+    """Return weights (count,) that rise as a sine over `edge` and fall likewise; squares of overlapped neighbours add
+    to 1.
+    """
     rise = np.sin(0.5 * pi * (np.arange(edge) + 0.5) / edge)
     return np.concatenate([rise, np.ones(count - 2 * edge), rise[::-1]])
 

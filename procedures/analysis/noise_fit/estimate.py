@@ -11,7 +11,9 @@ PROCESSES = ("quantization", "random_walk", "bias_instability", "rate_random_wal
 
 @dataclass(frozen=True)
 class Estimate:
-    """The estimate of one coefficient; value, uncertainty and interval are None where the process was not observed."""
+    """Estimate of one noise coefficient; value, uncertainty and interval are None where the process was not
+    observed.
+    """
 
     value: float | None
     """Q [rate·s], N [rate·√s], B [rate], K [rate/√s] or |R| [rate/s]."""
@@ -36,7 +38,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Followed:
-    """A regressor of the slow part that the rate follows."""
+    """A regressor of the slow part that the rate follows (a temperature, a shift), with its slope."""
 
     index: int
     """Index among the given regressors, from 0."""
@@ -114,7 +116,7 @@ class NoiseFit:
     """Shortest relaxation time of the flicker, where it is another than that of `core.noise`."""
 
     def of(self, process: str) -> Estimate:
-        """The estimate of one of `PROCESSES`."""
+        """Return the estimate of one of `PROCESSES`, by its name."""
         estimates = (
             self.quantization,
             self.random_walk,
@@ -125,6 +127,6 @@ class NoiseFit:
         return estimates[PROCESSES.index(process)]
 
     def coefficients(self) -> NoiseCoefficients:
-        """The values, zero where a process was not observed."""
+        """Return the values as coefficients, zero where a process was not observed."""
         q, n, b, k, r = (self.of(process).value or 0.0 for process in PROCESSES)
         return NoiseCoefficients(q, n, b, k, r)

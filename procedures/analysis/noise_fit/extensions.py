@@ -50,7 +50,7 @@ class Extension:
     """Shortest relaxation time of the flicker."""
 
     def applied(self, joined: Joined) -> Joined:
-        """The bins with this model's columns; the process is the last of them."""
+        """Return the bins with this model's columns; the process is the last of them."""
         s = joined.spectrum
         columns = s.columns.copy()
         if self.corner_s is not None:
@@ -61,13 +61,13 @@ class Extension:
         return replace(joined, spectrum=replace(s, columns=columns), added=1)
 
     def scaled(self, factor: float) -> "Extension":
-        """The same extension with its time multiplied by `factor`."""
+        """Return the same extension with its time multiplied by `factor`."""
         if self.time_s is not None:
             return Extension(time_s=factor * self.time_s)
         return Extension(corner_s=factor * (self.corner_s or 0.0))
 
     def taken_from(self, joined: Joined) -> Joined:
-        """The bins with their columns before the extension."""
+        """Return the bins with their columns as before the extension."""
         s = joined.spectrum
         columns = s.columns[:, : s.columns.shape[1] - joined.added].copy()
         columns[:, BIAS_INSTABILITY] = joined.flicker
@@ -95,7 +95,7 @@ def gauss_markov(joined: Joined, time_s: float) -> Array:
 
 
 def flicker_from(joined: Joined, corner_s: float) -> Array:
-    """Expected power (b,) of a flicker of unit B² with the shortest relaxation time `corner_s`."""
+    """Return the expected power (b,) of a flicker of unit B² with the shortest relaxation time `corner_s`."""
     count = max(2, round(_PER_E_FOLD * abs(log(corner_s / _FIRST_CORNER_S))) + 1)
     times = np.geomspace(_FIRST_CORNER_S, corner_s, count)
     weights = np.full(count, log(corner_s / _FIRST_CORNER_S) / (count - 1))
@@ -106,7 +106,7 @@ def flicker_from(joined: Joined, corner_s: float) -> Array:
 
 
 def extension(joined: Joined, at: State) -> Extension | None:
-    """The extension that the record needs, or None; `at` is the fit of all five processes, with a ramp."""
+    """Return the extension that the record needs, or None; `at` is the fit of all five processes, with a ramp."""
     best, most = None, 0.0
     for one in candidates(joined, _EVERY):
         if _score(joined, at, one) > SCORE:
@@ -124,7 +124,7 @@ def extension(joined: Joined, at: State) -> Extension | None:
 
 
 def candidates(joined: Joined, every: int = 1) -> list[Extension]:
-    """The extensions to try; with `every` > 1, only each `every`-th of the trial times."""
+    """Return the extensions to try; with `every` > 1, only each `every`-th of the trial times."""
     shortest = max(SHORTEST_S, CELLS * float(np.max(joined.period_s)))
     longest = LONGEST * 0.5 / float(joined.frequency_hz[0])
     if longest <= shortest:

@@ -26,7 +26,7 @@ _FIRST = len(ENDS) + 1
 
 @dataclass(frozen=True)
 class Candidate:
-    """Conditions under which a regressor is kept."""
+    """Conditions under which a regressor is kept: level of significance, and gain."""
 
     level: float
     """Probability of the test of its slope."""

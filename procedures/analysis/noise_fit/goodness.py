@@ -13,7 +13,7 @@ _LEAST_SHARE = 1e-12
 
 
 def deviates(spectrum: Spectrum, variances: Array, amplitudes: Array) -> Array:
-    """Normal deviates of the bins, (b,): power over expectation is χ²_ν/ν, whose quantile is converted to z."""
+    """Return normal deviates of the bins, (b,): power over expectation is χ²_ν/ν, whose quantile is converted to z."""
     s = spectrum
     explained = 2.0 * s.products @ amplitudes - np.einsum("i,bij,j->b", amplitudes, s.gram, amplitudes)
     expected = s.columns @ variances

@@ -47,16 +47,16 @@ class Joined:
         return np.unique(key, return_inverse=True)[1].astype(np.int64)
 
     def without(self, groups: range) -> "Joined":
-        """The same bins with some octaves excluded from the fit, allowing for an edge of the white noise."""
+        """Return the same bins with some octaves excluded from the fit, allowing for an edge of the white noise."""
         group = self.group
         return replace(self, fitted=self.fitted & ~((group >= groups.start) & (group < groups.stop)))._edged()
 
     def with_regressors(self, keep: Sequence[int]) -> "Joined":
-        """The same bins with some of the regressors."""
+        """Return the same bins with only the regressors of these indices."""
         return replace(self, spectrum=self.spectrum.only(keep))
 
     def below(self, highest_hz: float) -> "Joined":
-        """The same bins, fitted below a frequency only."""
+        """Return the same bins, fitted below a frequency only."""
         return replace(self, fitted=self.fitted & (self.frequency_hz < highest_hz))._edged()
 
     def _edged(self) -> "Joined":
@@ -73,7 +73,7 @@ class Joined:
         return replace(self, spectrum=replace(s, columns=columns))
 
     def octaves(self, variances: Array, amplitudes: Array, ramp: bool) -> tuple[Octave, ...]:
-        """Goodness of fit of each octave, separately for slow and fast, and for fitted and excluded bins."""
+        """Return the goodness of fit of each octave, separately for slow and fast, and for fitted and excluded bins."""
         s = self.spectrum if ramp else self.spectrum.without_ramp
         z = deviates(s, variances, amplitudes)
         key = self.group * 2 + ~self.fitted
@@ -88,7 +88,7 @@ class Joined:
 
 
 def joined_at(slow: Powers, fast: Powers | None, crossover_hz: float) -> Joined:
-    """Slow bins below the crossover and fast ones above.
+    """Return slow bins below the crossover and fast ones above, as one spectrum.
 
     Fast bins that do not follow the slow ones at once have a quantization of their own, in a fifth column.
     """

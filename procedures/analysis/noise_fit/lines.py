@@ -24,7 +24,7 @@ _EFFICIENCY = 0.6
 
 @dataclass(frozen=True)
 class SpectralLine:
-    """One line that was cut out before the fit."""
+    """One spectral line that was cut out before the fit: frequency and amplitude."""
 
     frequency_hz: float
     """Frequency of the strongest mode of the line."""

@@ -208,7 +208,9 @@ class FastPowers:
         self._waiting = 0
 
     def finish(self) -> Powers:
-        """The spectrum from the crossover up, without its lines. Raises `UnfitRecording` where no segment was whole."""
+        """Return the spectrum from the crossover up, without its lines. Call once, after the last sample. Raises
+        `UnfitRecording` where no segment was whole.
+        """
         if self.segments == 0:
             raise UnfitRecording(f"{self._count} samples are less than one segment of {self._length}")
         if self._waiting:

@@ -42,7 +42,7 @@ class Spectrum:
         return self.only(range(1, self.products.shape[1]))
 
     def only(self, regressors: Sequence[int]) -> "Spectrum":
-        """The same bins with some of the regressors."""
+        """Return the same bins with only the regressors of these indices."""
         keep = list(regressors)
         gram = self.gram[:, keep][:, :, keep]
         return Spectrum(self.squares, self.dof, self.columns, self.products[:, keep], gram)
@@ -50,7 +50,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class State:
-    """Quantities that follow from one vector v of variances."""
+    """Quantities that follow from one vector v of variances: power, residual, amplitudes, log likelihoods."""
 
     variances: Array
     """Variances v, (p,)."""
@@ -71,7 +71,7 @@ class State:
 
 
 def state(spectrum: Spectrum, variances: Array) -> State:
-    """Compute the state at variances v."""
+    """Return the state at variances v; its log likelihood is −∞ where the power is not positive."""
     s = spectrum
     power = s.columns @ variances
     if not np.all(power > 0.0):
@@ -97,7 +97,7 @@ def _impossible(spectrum: Spectrum, variances: Array) -> State:
 
 
 def information(spectrum: Spectrum, at: State) -> Array:
-    """Fisher information of v, ``½ Σν' A_k A_l/S²``, (p, p)."""
+    """Return the Fisher information of v, ``½ Σν' A_k A_l/S²``, (p, p)."""
     scaled = spectrum.columns / at.power[:, None]
     return 0.5 * (scaled.T * at.dof) @ scaled
 
@@ -105,7 +105,9 @@ def information(spectrum: Spectrum, at: State) -> Array:
 def maximum(
     spectrum: Spectrum, free: Sequence[int], held: tuple[int, float] | None = None, start: Array | None = None
 ) -> State:
-    """The greatest restricted likelihood over the `free` variances; one may be `held` at a value, the others are 0."""
+    """Return the state of greatest restricted likelihood over the `free` variances; one may be `held` at a value, the
+    others are 0.
+    """
     free = [k for k in free if held is None or k != held[0]]
     fixed = np.zeros(spectrum.columns.shape[1])
     if held is not None:
@@ -178,7 +180,9 @@ def _climb(spectrum: Spectrum, best: State, target: Array) -> State:
 
 @dataclass
 class Profile:
-    """Twice the loss of log likelihood where variance k is held fixed and the other `free` ones are fitted."""
+    """Likelihood profile of variance k: twice the loss of log likelihood where it is held fixed and the other `free`
+    ones are fitted.
+    """
 
     spectrum: Spectrum
     free: tuple[int, ...]
@@ -186,7 +190,7 @@ class Profile:
     best: State
 
     def loss(self, variance: float) -> float:
-        """Twice the loss of log likelihood at one value of variance k."""
+        """Return twice the loss of log likelihood at one value of variance k."""
         held = maximum(self.spectrum, self.free, (self.k, variance), self.best.variances)
         return 2.0 * (self.best.log_likelihood - held.log_likelihood)
 
@@ -209,6 +213,6 @@ class Profile:
 
 
 def only_where(mask: NDArray[np.bool_], spectrum: Spectrum) -> Spectrum:
-    """Select some of the bins."""
+    """Return the spectrum of the bins of a mask, (b,)."""
     s = spectrum
     return Spectrum(s.squares[mask], s.dof[mask], s.columns[mask], s.products[mask], s.gram[mask])

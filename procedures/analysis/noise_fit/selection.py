@@ -44,13 +44,13 @@ class Slope:
         return 2.0 * float(stdtr(self.dof, -abs(self.slope) / self.standard_uncertainty))
 
     def factor(self, probability: float) -> float:
-        """Student's quantile at `probability`, with these degrees of freedom."""
+        """Return Student's quantile at `probability`, with these degrees of freedom."""
         return float(stdtrit(self.dof, probability))
 
 
 @dataclass(frozen=True)
 class Selection:
-    """The processes found, and the fit with them alone."""
+    """Processes that were found in a spectrum, and the fit with them alone."""
 
     present: tuple[int, ...]
     """Indices in `VARIANCES`, ascending."""
@@ -69,7 +69,9 @@ class Selection:
 
 
 def select(spectrum: Spectrum, level: float) -> Selection:
-    """Select the processes of a spectrum; its regressors are ramp, first and last reading, and others always kept."""
+    """Return the processes that a spectrum shows; its regressors are ramp, first and last reading, and others always
+    kept.
+    """
     untested = tuple(range(len(VARIANCES), spectrum.columns.shape[1]))
     sloped, flat = _Fits(spectrum, untested), _Fits(spectrum.without_ramp, untested)
     everything = slope_of(spectrum, sloped.best(VARIANCES))
@@ -112,7 +114,9 @@ class _Fits:
 
 
 def slope_of(spectrum: Spectrum, at: State, index: int = RAMP) -> Slope:
-    """Slope of one regressor (default: the ramp) at a fitted state, with Satterthwaite's degrees of freedom."""
+    """Return the slope of one regressor (default: the ramp) at a fitted state, with Satterthwaite's degrees of
+    freedom.
+    """
     s, inverse = spectrum, at.amplitude_covariance
     variance = float(inverse[index, index])
     by_variance = np.einsum("bk,bij->kij", s.columns / at.power[:, None] ** 2, s.gram)
@@ -123,7 +127,7 @@ def slope_of(spectrum: Spectrum, at: State, index: int = RAMP) -> Slope:
 
 
 def inverse_information(matrix: Array) -> Array:
-    """The inverse of a Fisher matrix whose parameters differ by many orders of magnitude."""
+    """Return the inverse of a Fisher matrix whose parameters differ by many orders of magnitude."""
     scale = 1.0 / np.sqrt(np.diag(matrix))
     return np.linalg.pinv(matrix * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
 

@@ -10,7 +10,6 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import zoom_fft
 
 from procedures.analysis.noise_fit.lines import SpectralLine, levels_around, standing_out
 from procedures.core.arrays import Array
@@ -81,6 +80,8 @@ def _detrended(y: Array) -> Array:
 
 def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
     """Cycles in the record of the most prominent mode; None where none is significant."""
+    from scipy.signal import zoom_fft  # with all of scipy's statistics: only where it is called
+
     power = np.abs(np.fft.rfft(y * taper)) ** 2
     power = power[:-1]
     around, _ = levels_around(power, 2.0, _MANY)

@@ -26,7 +26,7 @@ _SIGMAS = 2.0
 
 
 def undescribed(agreement: Agreement, *, coarse: bool) -> tuple[int, ...]:
-    """Indices in `PROCESSES` that the fit does not describe; `coarse`: the noise is less than a count."""
+    """Return the indices in `PROCESSES` that the fit does not describe; `coarse`: the noise is less than a count."""
     if not agreement.described:
         return tuple(range(len(PROCESSES)))
     found = {QUANTIZATION, RANDOM_WALK} if coarse else set[int]()
@@ -45,7 +45,7 @@ def undescribed(agreement: Agreement, *, coarse: bool) -> tuple[int, ...]:
 
 
 def limited(agreement: Agreement, estimates: tuple[Estimate, ...], numbers: tuple[int, ...]) -> tuple[Estimate, ...]:
-    """The estimates; those in `numbers` have no value, and the limit that the octaves' power sets."""
+    """Return the estimates; those in `numbers` have no value, and the limit that the octaves' power sets."""
     return tuple(
         replace(
             e,

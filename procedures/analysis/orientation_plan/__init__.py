@@ -1,1 +1,1 @@
-"""Search for the orientations of the table that make a calibration surest in a given time."""
+"""Search for the orientations of the table that give a calibration the least uncertainty in a given time."""

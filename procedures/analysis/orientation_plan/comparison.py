@@ -1,4 +1,4 @@
-"""Compare plans of orientations in the same bench time, by the estimators that would use them."""
+"""Comparison of plans of orientations in the same bench time, by the estimators that would use them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,9 @@ class Requirements:
     cross_coupling: float
 
     def of_twelve(self, matrix: Array) -> Array:
-        """Limits of the twelve coefficients in their units, shape (12,): a row of K in parts of its scale factor."""
+        """Return the limits of the twelve coefficients in their units, shape (12,): a row of K in parts of its scale
+        factor.
+        """
         found = np.zeros((3, 4))
         for c in range(3):
             found[c] = self.bias, *(np.full(3, self.cross_coupling) * abs(matrix[c, c]))
@@ -37,14 +39,14 @@ class Requirements:
         return found.ravel()
 
     def of_nine(self, matrix: Array) -> Array:
-        """Limits of the scalar nine (b, s, t) in their units, shape (9,)."""
+        """Return the limits of the scalar nine (b, s, t) in their units, shape (9,)."""
         scale = self.scale_factor / np.abs(np.diagonal(matrix))
         return np.array([self.bias] * 3 + scale.tolist() + [self.cross_coupling] * 3)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """The bench, the place and the unit that plans are compared on."""
+    """The bench, the site, the unit and the model for which plans are compared."""
 
     unit: Unit
     site: Site
@@ -57,7 +59,7 @@ class Setting:
     """Requirements by triad; only these triads count."""
 
     def limits(self, triad: str, matrix: Array) -> Array:
-        """Limits of the model's coefficients, shape (12,) or (9,)."""
+        """Return the limits of the model's coefficients, shape (12,) or (9,)."""
         r = self.requirements[triad]
         return r.of_nine(matrix) if self.model == "scalar" else r.of_twelve(matrix)
 
@@ -75,7 +77,7 @@ class ScoredPlan:
     """Standard uncertainties divided by their limits."""
 
     def worst(self, triad: str) -> float:
-        """Greatest ratio of standard uncertainty to limit of a triad."""
+        """Return the greatest ratio of standard uncertainty to limit of a triad."""
         return float(self.relative[triad].max())
 
     @property
@@ -85,7 +87,7 @@ class ScoredPlan:
 
 
 def stations(angles: Sequence[TableAngles], dwell_s: float, settle_s: float) -> tuple[Station, ...]:
-    """Stations of the plan, one an orientation, in order."""
+    """Return the stations of the plan, one an orientation, in order."""
     return tuple(
         Station(i, f"{a.outer_deg:.4g} {a.middle_deg:.4g} {a.inner_deg:.4g}", a, settle_s=settle_s, record_s=dwell_s)
         for i, a in enumerate(angles)
@@ -93,12 +95,12 @@ def stations(angles: Sequence[TableAngles], dwell_s: float, settle_s: float) -> 
 
 
 def total_time_s(angles: Sequence[TableAngles], dwell_s: float, setting: Setting) -> float:
-    """Duration from the table's zero to the end of the last dwell."""
+    """Return the duration from the table's zero to the end of the last dwell [s]."""
     return float(windows(stations(angles, dwell_s, setting.settle_s), setting.axes)[-1, 1])
 
 
 def in_short_order(angles: Sequence[TableAngles], setting: Setting) -> tuple[TableAngles, ...]:
-    """Order orientations by the nearest next, beginning from the table's zero."""
+    """Return the orientations ordered by the nearest next, beginning from the table's zero."""
     left, at, ordered = list(angles), TableAngles(), list[TableAngles]()
     while left:
         at = min(left, key=partial(move_time_s, at, axes=setting.axes))
@@ -108,7 +110,7 @@ def in_short_order(angles: Sequence[TableAngles], setting: Setting) -> tuple[Tab
 
 
 def scored(angles: Sequence[TableAngles], total_s: float, setting: Setting) -> ScoredPlan:
-    """The plan in this order, with the longest dwell that the time allows.
+    """Return the plan in this order, with the longest dwell that the time allows.
 
     Raises `Undetermined` where the orientations do not show all coefficients, `BadParameter` where the time is too
     short to move.
@@ -129,7 +131,9 @@ def scored(angles: Sequence[TableAngles], total_s: float, setting: Setting) -> S
 
 
 def design(triad: str, count: int, dwell_s: float, setting: Setting) -> TriadDesign:
-    """Design of a triad for a search of `count` orientations: a dwell's noise in shared and independent parts."""
+    """Return the design of a triad for a search of `count` orientations: a dwell's noise in shared and independent
+    parts.
+    """
     record = stations([TableAngles()] * count, dwell_s, setting.settle_s)
     plan = triad_plan(triad, setting.unit, record, setting.axes, setting.site, setting.table)
     covariance = _known_noise(plan)
@@ -162,7 +166,7 @@ def worst_bound(triad: str, count: int, total_s: float, setting: Setting) -> flo
 
 
 def worst_by_triad(plan: ScoredPlan) -> dict[str, float]:
-    """Greatest ratio of standard uncertainty to limit of each triad, for the search's objective."""
+    """Return the greatest ratio of standard uncertainty to limit of each triad, for the search's objective."""
     return {triad: plan.worst(triad) for triad in plan.relative}
 
 

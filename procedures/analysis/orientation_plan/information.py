@@ -41,12 +41,14 @@ class TriadDesign:
 
 
 def unit_vectors(angles_deg: Array, vector_r: Array) -> Array:
-    """A constant vector in the unit's axes at table angles (m, 3), outer, middle, inner; shape (m, 3)."""
+    """Return a constant vector in the unit's axes at table angles (m, 3), outer, middle, inner; shape (m, 3)."""
     return np.asarray(Rotation.from_euler("YZX", angles_deg, degrees=True).inv().apply(vector_r), dtype=np.float64)
 
 
 def flaw_axes(angles_deg: Array) -> Array:
-    """Axes of the table's eight turns in the unit's axes, shape (m, 8, 3), in the order of `table_errors`."""
+    """Return the axes of the table's eight turns in the unit's axes, shape (m, 8, 3), in the order of
+    `table_errors`.
+    """
     whole = Rotation.from_euler("YZX", angles_deg, degrees=True).inv()
     inner = Rotation.from_euler("X", angles_deg[:, 2:], degrees=True).inv()
     middle = Rotation.from_euler("Z", angles_deg[:, 1:2], degrees=True).inv()
@@ -92,14 +94,16 @@ def _scalar(vectors: Array, design: TriadDesign) -> Array:
 
 
 def prior(model: Model) -> Array:
-    """Prior information before the first station: the flaws, to one spread each. The rest is next to nothing."""
+    """Return the prior information before the first station: the flaws, to one spread each. The rest is next to
+    nothing.
+    """
     size, known = (9, 0) if model == "scalar" else (12 + FLAWS, FLAWS)
     # A coefficient is known beforehand to 30 000 times its limit: keeps unlucky beginnings of a search finite.
     return np.diag([1e-9] * (size - known) + [1.0] * known)
 
 
 def relative_sd(total: Array, design: TriadDesign, model: Model) -> Array:
-    """Standard uncertainties over limits from total information (…, P, P): (…, 12) linear, (…, 9) scalar."""
+    """Return standard uncertainties over limits from total information (…, P, P): (…, 12) linear, (…, 9) scalar."""
     variance = np.diagonal(np.linalg.inv(total), axis1=-2, axis2=-1).copy()
     biases = np.array([0, 1, 2] if model == "scalar" else [0, 4, 8])
     variance[..., biases] += design.slow_variance / design.limits[biases] ** 2
@@ -122,7 +126,7 @@ class Objective:
     care: float = 0.7
 
     def cost(self, totals: Sequence[Array]) -> Array:
-        """Cost of total informations, one (…, P, P) a triad; shape (…)."""
+        """Return the cost of total informations, one (…, P, P) a triad; shape (…)."""
         worst = max(self.reference.values())
         parts: list[Array] = []
         for total, design in zip(totals, self.designs, strict=True):

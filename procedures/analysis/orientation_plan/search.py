@@ -35,7 +35,7 @@ class SearchSettings:
 
 
 def grid(settings: SearchSettings) -> Array:
-    """Candidates (m, 3) [deg] within the limits, without angles that a whole turn makes equal."""
+    """Return the candidate angles (m, 3) [deg] within the limits, without angles that a whole turn makes equal."""
     sides: list[Array] = []
     for low, high in zip(settings.minimum_deg, settings.maximum_deg, strict=True):
         first, last = np.ceil(low / settings.grid_deg), np.floor(high / settings.grid_deg)
@@ -46,7 +46,7 @@ def grid(settings: SearchSettings) -> Array:
 
 
 def best_orientations(count: int, objective: Objective, table: TableUncertainty, settings: SearchSettings) -> Array:
-    """Table angles (count, 3) [deg]: outer, middle, inner."""
+    """Return the table angles (count, 3) [deg] of least cost: outer, middle, inner. Takes seconds."""
     from scipy.stats import qmc  # all of scipy's statistics for one sequence: only where it is used
 
     candidates = grid(settings)

@@ -26,7 +26,7 @@ MOST_CHECKS = 300
 
 
 def checks_of(rule: StopRule, longest_s: float) -> tuple[float, int]:
-    """Interval [s] and number of the checks of a dwell."""
+    """Return the interval [s] and the number of the checks of a dwell."""
     count = max(1, int(longest_s / rule.check_s + 1e-9))
     if count > MOST_CHECKS:
         return longest_s / MOST_CHECKS, MOST_CHECKS
@@ -34,7 +34,7 @@ def checks_of(rule: StopRule, longest_s: float) -> tuple[float, int]:
 
 
 def mean_sd(noise: NoiseCoefficients, duration_s: float) -> float:
-    """Standard uncertainty of the plain mean over a dwell, slow noise within it included [rate]."""
+    """Return the standard uncertainty of the plain mean over a dwell, slow noise within it included [rate]."""
     return float(np.sqrt(mean_covariance(noise, [[0.0, duration_s]])[0, 0]))
 
 
@@ -48,7 +48,7 @@ def expected_s(rule: StopRule, longest_s: float) -> float:
 
 
 class LiveDwell:
-    """Follows the samples of a dwell, block by block, and says how many of them are enough."""
+    """Follows the samples of a dwell, block by block, and decides how many of them are enough."""
 
     def __init__(self, rule: StopRule, channels: Sequence[Channel], rate_hz: float, longest_s: float) -> None:
         """Start before the first sample. Raises `MissingChannel`."""
@@ -93,7 +93,7 @@ class LiveDwell:
 
     @property
     def p_value(self) -> float:
-        """Chance of innovations as large under the declared noise, of the least likely channel (Bonferroni)."""
+        """Probability of innovations as large under the declared noise, of the least likely channel (Bonferroni)."""
         least = 1.0
         for estimate in self._estimates:
             found = estimate.innovations

@@ -20,7 +20,7 @@ STRETCHES = 20
 
 @dataclass(frozen=True)
 class InnovationTest:
-    """Test of one channel's innovations."""
+    """Test of one channel's innovations: their size and their whiteness."""
 
     mean_square: float
     """Mean normalised innovation squared; 1 is expected."""
@@ -40,7 +40,7 @@ class InnovationTest:
         return min(1.0, 2.0 * min(self.size_p_value, self.whiteness_p_value))
 
     def sentence(self, level: float) -> str:
-        """Sentence on a channel that fails at a level; empty for one that does not."""
+        """Return a sentence on a channel that fails at a level; empty for one that does not."""
         if self.p_value >= level:
             return ""
         spread = float(np.sqrt(2.0 / self.degrees_of_freedom))
@@ -80,6 +80,6 @@ def _white(mean_product: float, count: int) -> float:
 
 
 def two_sided(statistic: float, degrees_of_freedom: int) -> float:
-    """Chance that chi-square lies as far out on either side."""
+    """Return the probability that chi-square lies as far out on either side."""
     below, above = chdtr(degrees_of_freedom, statistic), chdtrc(degrees_of_freedom, statistic)
     return float(min(1.0, 2.0 * min(below, above)))

@@ -38,7 +38,7 @@ class RecursiveBias:
 
     @property
     def variances(self) -> Array:
-        """P(k|k) after each of the n measurements, known before the first: textbook S 5.183, shape (n,)."""
+        """Variance P(k|k) after each of the n measurements, known before the first: textbook S 5.183, shape (n,)."""
         return 1.0 / self._information
 
     @property
@@ -65,7 +65,9 @@ class RecursiveBias:
         return np.array(self._normalised)
 
     def update(self, measurement: float) -> float:
-        """Process the next measurement and return the new estimate."""
+        """Take the next measurement and return the new estimate. Raises `BadParameter` beyond the measurements whose
+        noise was declared.
+        """
         k = self.count
         if k == len(self._lower):
             raise BadParameter("measurements", k + 1, f"at most the {k} whose noise was declared")
@@ -81,11 +83,13 @@ class RecursiveBias:
         return self.estimate
 
     def enough_at(self, target_sd: float) -> int | None:
-        """Number of measurements that suffices, known before the first; None where all n are too few."""
+        """Return the number of measurements that suffices for a standard uncertainty, known before the first; None
+        where all n are too few.
+        """
         reached = np.flatnonzero(self.variances <= target_sd**2)
         return int(reached[0]) + 1 if reached.size else None
 
 
 def white_covariance(variance: float, count: int) -> Array:
-    """White-noise covariance of S: R on the diagonal, shape (n, n)."""
+    """Return the covariance of white noise: R on the diagonal, shape (n, n)."""
     return variance * np.eye(count)

@@ -140,7 +140,7 @@ def slow_noise_p(means: Array, covariance: Array) -> float:
 
 
 def predicted_sd(noise: NoiseCoefficients, dwell_s: float, start_s: float, prior_variance: float | None) -> float:
-    """Standard uncertainty of a bias after a dwell, in a hundred windows of it."""
+    """Return the standard uncertainty of a bias after a dwell, in a hundred windows of it."""
     edges = start_s + np.linspace(0.0, dwell_s, 101)
     covariance = contiguous_covariance(noise, np.column_stack([edges[:-1], edges[1:]]))
     return float(np.sqrt(RecursiveBias(covariance, 0.0, prior_variance).variances[-1]))
@@ -149,19 +149,21 @@ def predicted_sd(noise: NoiseCoefficients, dwell_s: float, start_s: float, prior
 def dwell_needed(
     noise: NoiseCoefficients, target_sd: float, start_s: float, prior_variance: float | None, shortest_s: float
 ) -> float | None:
-    """Shortest dwell [s], `shortest_s` at least, for the required uncertainty of a bias; None where none suffices."""
+    """Return the shortest dwell [s], `shortest_s` at least, for the required uncertainty of a bias; None where none
+    suffices.
+    """
     return dwell_for(lambda dwell: predicted_sd(noise, dwell, start_s, prior_variance), target_sd, shortest_s)
 
 
 def known_noise(noise: NoiseCoefficients | None) -> NoiseCoefficients | None:
-    """The coefficients if at least one of the short-time processes is present, else None."""
+    """Return the coefficients if at least one of the short-time processes is present, else None."""
     if noise is None or not (noise.quantization > 0.0 or noise.random_walk > 0.0 or noise.bias_instability > 0.0):
         return None
     return noise
 
 
 def channel_names(recording: Recording, wanted: tuple[str, ...] | None, all_of: tuple[str, ...]) -> tuple[str, ...]:
-    """The requested channels, else those of `all_of` that the recording has. Raises `MissingChannel`."""
+    """Return the requested channels, else those of `all_of` that the recording has. Raises `MissingChannel`."""
     present = tuple(c.name for c in recording.info.channels)
     names = wanted or tuple(name for name in all_of if name in present)
     if not names:

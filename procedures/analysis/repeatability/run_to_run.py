@@ -34,12 +34,12 @@ class Scatter:
     value_sds: tuple[float, ...] = ()
 
     def resolves(self, limit: float) -> bool:
-        """True if the measurement is finer than a limit on the standard deviation."""
+        """Return whether the measurement is finer than a limit on the standard deviation."""
         return self.expected_from_measurement < limit
 
 
 def run_to_run(calibrations: Sequence[TriadCalibration]) -> tuple[Scatter, ...]:
-    """Scatter of the three biases and the three scale factors of one triad over at least two calibrations.
+    """Return the scatter of the three biases and the three scale factors of one triad over at least two calibrations.
 
     Bias in its own unit, scale factor K_ii relative to its mean (thesis 5.2, 5.3). A calibration of the scalar kind has
     other axes than a linear one, so the two are not mixed.
@@ -72,7 +72,7 @@ def _scatter(values: Array, sds: Array, size: float) -> tuple[float, float, floa
 
 
 def sd_interval(sd: float, n: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Interval of the true standard deviation given that of n Gaussian values, ``s·√((n − 1)/χ²)``."""
+    """Return the interval of the true standard deviation given that of n Gaussian values, ``s·√((n − 1)/χ²)``."""
     tail = 0.5 * (1.0 - confidence)
     low, high = float(chdtri(n - 1, tail)), float(chdtri(n - 1, 1.0 - tail))
     return sd * float(np.sqrt((n - 1) / low)), sd * float(np.sqrt((n - 1) / high))

@@ -53,12 +53,12 @@ class ExpectedErrors:
     """False: the noise of some triad is unknown, and its part is missing."""
 
     def of_angle(self, angle: int) -> Array:
-        """All sources together for one of `ANGLES` by index, shape (n, n)."""
+        """Return the covariance from all sources together for one of `ANGLES` by index, shape (n, n)."""
         whole = np.sum(list(self.by_source.values()), axis=0)
         return np.asarray(whole[angle::3, angle::3], dtype=np.float64)
 
     def part(self, source: str, angle: int) -> Array:
-        """One source for one angle, shape (n, n)."""
+        """Return the covariance from one source for one of `ANGLES` by index, shape (n, n)."""
         return self.by_source[source][angle::3, angle::3]
 
 
@@ -93,7 +93,7 @@ def reference_attitudes(angles: Sequence[TableAngles], site: Site) -> Array:
 
 
 def calibration_in_use(unit: Unit, triad: str) -> TriadCalibration:
-    """The unit's current calibration of a triad, used for the alignment. Raises `DomainError` without one."""
+    """Return the unit's current calibration of a triad, used for the alignment. Raises `DomainError` without one."""
     return unit.required_calibration(triad, "align with")
 
 
@@ -185,5 +185,5 @@ def _spread(per_channel: Array, covariance: Array) -> Array:
 
 
 def rms_deg(covariance: Array) -> float:
-    """Root of the mean variance of a covariance [deg]."""
+    """Return the root of the mean variance of a covariance [rad²], in degrees."""
     return float(np.sqrt(np.mean(np.diagonal(covariance)))) / units.DEG

@@ -64,7 +64,9 @@ class AngleErrors:
 
 
 def recorded_alignments(recordings: Sequence[Recording], unit: Unit, site: Site, table: TableUncertainty) -> Alignments:
-    """Times and attitudes of the recordings. Raises `UnfitRecording` where one has no table angles."""
+    """Return times and attitudes of the recordings as alignments. Raises `UnfitRecording` where one has no table
+    angles.
+    """
     infos = [r.info for r in recordings]
     angles = tuple(i.station.angles for i in infos if i.station is not None and i.station.angles is not None)
     if not infos or len(angles) < len(infos):
@@ -96,14 +98,14 @@ def found_attitudes(recordings: Sequence[Recording], plan: Alignments) -> Array:
 
 
 def alignment_errors(found: Array, plan: Alignments) -> Array:
-    """Found minus declared, shape (n, 3) [rad], within ±π."""
+    """Return the found minus the declared attitudes, shape (n, 3) [rad], within ±π."""
     return np.asarray(np.angle(np.exp(1j * (found - reference_attitudes(plan.angles, plan.site)))), dtype=np.float64)
 
 
 def told_alignments(
     recordings: Sequence[Recording], plan: Alignments, found: Array, errors: Array, expected: ExpectedErrors
 ) -> tuple[Alignment, ...]:
-    """Convert the results to display units, alignment by alignment."""
+    """Return the results in display units, alignment by alignment."""
     sds = np.column_stack([np.sqrt(np.diagonal(expected.of_angle(a))) for a in range(3)])
     told: list[Alignment] = []
     for i, recording in enumerate(recordings):
@@ -124,7 +126,7 @@ def told_alignments(
 
 
 def judged_angle(angle: int, errors: Array, expected: ExpectedErrors) -> AngleErrors:
-    """Errors (n, 3) [rad] of one of `ANGLES`, by index, against their covariance."""
+    """Return the errors (n, 3) [rad] of one of `ANGLES`, by index, judged against their covariance."""
     e, covariance = errors[:, angle], expected.of_angle(angle)
     n = len(e)
     statistic = chi_square(e, covariance) if expected.noise_known else None

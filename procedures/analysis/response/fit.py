@@ -68,7 +68,7 @@ class Lag:
 
     @property
     def p_value(self) -> float | None:
-        """Chance of residuals at least as large; None without degrees of freedom."""
+        """Probability of residuals at least as large; None without degrees of freedom."""
         return tail_probability(self.chi_square, self.degrees_of_freedom) if self.degrees_of_freedom > 0 else None
 
     @property
@@ -105,7 +105,7 @@ class Lag:
 
 @dataclass(frozen=True)
 class Lags:
-    """Fits of all channels, and how much their recordings' stamps scatter."""
+    """Fits of all channels, and the scatter of their recordings' stamps."""
 
     lags: tuple[Lag, ...]
     scatter_s: float
@@ -115,7 +115,7 @@ class Lags:
 
 
 def model(parameters: Array, omega: Array) -> tuple[Array, Array]:
-    """ln|H| and the phase [rad] at some angular frequencies, (n,) each; `parameters`: ln G, D, q."""
+    """Return ln|H| and the phase [rad] at some angular frequencies, (n,) each; `parameters`: ln G, D, q."""
     log_gain, delay_s, q = parameters
     time_constant = np.sqrt(max(q, 0.0))
     gain = log_gain - 0.5 * np.log(np.maximum(1.0 + omega**2 * q, 1e-9))
@@ -157,7 +157,9 @@ def fit_lags(channels: Mapping[str, Sequence[Response]], linearity: float) -> La
 
 
 def gain_p_value(lag: Lag) -> float | None:
-    """Chance of the gains' residuals alone, whose model has two parameters; None without degrees of freedom."""
+    """Return the p-value of the gains' residuals alone, whose model has two parameters; None without degrees of
+    freedom.
+    """
     degrees = len(lag.gain_residuals) - 2
     return tail_probability(float(lag.gain_residuals @ lag.gain_residuals), degrees) if degrees > 0 else None
 

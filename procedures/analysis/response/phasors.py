@@ -49,6 +49,8 @@ class Response:
     drift: float
     """Change of the phase over the recording, over ``ωT``: the unit's clock against the bench's, relative."""
     drift_sd: float
+    length_s: float = 0.0
+    """Length of the recording by its samples [s]."""
 
     @property
     def omega(self) -> float:
@@ -77,8 +79,8 @@ def response(samples: Samples, frequency_hz: float, noise: NoiseCoefficients | N
     omega, encoder = 2.0 * pi * frequency_hz, samples.encoder
     length_s = len(samples.time_s) / samples.rate_hz
     spread = float(np.sinc(frequency_hz / samples.rate_hz)) if samples.integrates else 1.0
-    of_angle = _fitted(encoder.time_s, encoder.angle_rad, omega, samples.label)
-    of_rate = _fitted(samples.time_s, samples.rate_rad_s, omega, samples.label)
+    of_angle = fitted(encoder.time_s, encoder.angle_rad, omega, samples.label)
+    of_rate = fitted(samples.time_s, samples.rate_rad_s, omega, samples.label)
     theta, gyro, scatter = of_angle.value, of_rate.value, of_angle.scatter
     if not abs(theta) > 10.0 * scatter:
         raise UnfitRecording(f"station {samples.label}: the encoder shows no sinusoid of {frequency_hz:g} Hz")
@@ -96,12 +98,12 @@ def response(samples: Samples, frequency_hz: float, noise: NoiseCoefficients | N
     drift, drift_sd = _drift(samples, omega, length_s, phase_sd)
     return Response(
         *(samples.label, frequency_hz, abs(theta), value, gain_sd, phase_sd),
-        *(ratio, degrees, encoder.within_s, drift, drift_sd),
+        *(ratio, degrees, encoder.within_s, drift, drift_sd, length_s),
     )
 
 
 def require_known(label: str, relative_sd: float) -> None:
-    """Refuse a response that is hardly known. Raises `UnfitRecording`."""
+    """Refuse a response whose relative standard uncertainty is too large. Raises `UnfitRecording`."""
     if not relative_sd < NOISIEST:
         raise UnfitRecording(
             f"station {label}: the response is known to {min(100.0 * relative_sd, 999.0):.3g} % alone, more than "
@@ -110,7 +112,9 @@ def require_known(label: str, relative_sd: float) -> None:
 
 
 @dataclass(frozen=True)
-class _Fitted:
+class Fitted:
+    """Complex amplitude of a sinusoid, fitted with a constant and a drift; its residuals and weights."""
+
     value: complex
     left: Array
     """Residuals, (n,)."""
@@ -158,8 +162,11 @@ def _design(times: Array, omega: float, length_s: float) -> Array:
     return np.stack([np.cos(phase), -np.sin(phase), np.ones_like(times), times / length_s - 0.5], axis=1)
 
 
-def _fitted(times: Array, values: Array, omega: float, label: str) -> _Fitted:
-    """Complex amplitude of values. Raises `UnfitRecording` where they cannot tell a sinusoid from a drift."""
+def fitted(times: Array, values: Array, omega: float, label: str) -> Fitted:
+    """Complex amplitude at ω [rad/s] of values (n,) at some times [s], (n,).
+
+    Raises `UnfitRecording` where they cannot tell a sinusoid from a drift.
+    """
     design = _design(times, omega, max(float(times[-1]), 1e-9))
     if len(times) <= design.shape[1] or np.linalg.cond(design) > WORST_CONDITION:
         raise UnfitRecording(
@@ -171,7 +178,7 @@ def _fitted(times: Array, values: Array, omega: float, label: str) -> _Fitted:
     left = values - design @ found
     variance = float(left @ left) / (len(times) - design.shape[1])
     scatter = float(np.sqrt(variance * 0.5 * np.sum(weights[:2] ** 2)))
-    return _Fitted(complex(found[0], found[1]), left, scatter, weights[:2])
+    return Fitted(complex(found[0], found[1]), left, scatter, weights[:2])
 
 
 def _beside(
@@ -207,8 +214,8 @@ def _drift(samples: Samples, omega: float, length_s: float, phase_sd: float) -> 
         other = (encoder.time_s * 2.0 >= length_s) == bool(half)
         if np.count_nonzero(other) < 5:
             return 0.0, float("inf")
-        gyro = _fitted(samples.time_s[own], samples.rate_rad_s[own], omega, samples.label)
-        theta = _fitted(encoder.time_s[other], encoder.angle_rad[other], omega, samples.label)
+        gyro = fitted(samples.time_s[own], samples.rate_rad_s[own], omega, samples.label)
+        theta = fitted(encoder.time_s[other], encoder.angle_rad[other], omega, samples.label)
         phases.append(gyro.value / theta.value)
     # Each half has √2 times the whole's deviation; their difference √2 times that again.
     return float(np.angle(phases[1] / phases[0])) / (0.5 * omega * length_s), 4.0 * phase_sd / (omega * length_s)

@@ -1,4 +1,5 @@
-"""Plan of a dynamic response: sinusoids of several frequencies about each axis of the unit, and what they can tell.
+"""Plan of a dynamic response: sinusoids of several frequencies about each axis of the unit, and the uncertainty to
+expect.
 
 The amplitude falls with the frequency, so that rate and acceleration stay within the table's limits.
 """
@@ -40,11 +41,11 @@ class ResponseProgram:
     settle_s: float
 
     def recorded_cycles(self, frequency_hz: float) -> int:
-        """Whole cycles of a recording."""
+        """Return the number of whole cycles of a recording at a frequency."""
         return max(LEAST_RECORDED, ceil(self.record_s * frequency_hz - 1e-9))
 
     def stations(self) -> tuple[Station, ...]:
-        """Axis after axis, frequency after frequency."""
+        """Return the stations, axis after axis, frequency after frequency."""
         made: list[Station] = []
         for axis in self.axes:
             for frequency, amplitude in zip(self.frequencies_hz, self.amplitudes_deg, strict=True):
@@ -58,12 +59,14 @@ class ResponseProgram:
         return tuple(made)
 
     def beyond_stations_s(self) -> float:
-        """Time in which the table swings and nothing is recorded [s]."""
+        """Return the time in which the table swings and nothing is recorded [s]."""
         return sum(s.sinusoid.duration_s - s.record_s for s in self.stations() if s.sinusoid is not None)
 
 
 def largest_amplitude_deg(frequency_hz: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
-    """Largest amplitude within shares of the limits ``2πfA`` and ``1.12·(2πf)²A``, at most `LARGEST_DEG` [deg]."""
+    """Return the largest amplitude within shares of the limits ``2πfA`` and ``1.12·(2πf)²A``, at most `LARGEST_DEG`
+    [deg].
+    """
     omega = 2.0 * pi * frequency_hz
     by_rate, by_acceleration = rate_deg_s / omega, acceleration_deg_s2 / (PEAK_ACCELERATION * omega**2)
     return min(LARGEST_DEG, LIMIT_SHARE * by_rate, LIMIT_SHARE * by_acceleration)

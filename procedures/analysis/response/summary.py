@@ -8,6 +8,7 @@ import numpy as np
 
 from procedures.analysis.least_squares.chi_square import tail_probability
 from procedures.analysis.response.fit import LEVEL, PARAMETERS, Lag, Lags, fit_lags, gain_p_value, model, unwrapped
+from procedures.analysis.response.pace import CLOCK_SIGMAS, require_measured_pace, require_pace
 from procedures.analysis.response.phasors import Response, response
 from procedures.analysis.response.trace import samples_of
 from procedures.core import units
@@ -20,8 +21,6 @@ from procedures.core.table_angles import TableAngles
 
 MORE_NOISE = 1e-4
 """Probability below which the noise beside a sinusoid is more than the record's: then it counts in its place."""
-CLOCK_SIGMAS = 4.0
-"""Standard uncertainties beyond which the unit's clock is said to differ from the bench's."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +57,9 @@ class ChannelResponse:
     """Part of it by noise, and by stamps that scatter from recording to recording."""
     delay_from_encoder_s: float
     """Part of it by the time of the encoder's readings."""
+    delay_from_clock_s: float
+    """Part of it by the unit's clock, where that differs from the bench's: the delay is another at each moment of a
+    recording, from its begin to its end by ``drift·T``, and counts as a rectangle's ``drift·T/√12``."""
     delay_degrees_of_freedom: int | None
     """Degrees of freedom of the uncertainty where the stamps' scatter was estimated; None: so many that none counts."""
     time_constant_s: float | None
@@ -83,7 +85,7 @@ class ChannelResponse:
 
 @dataclass(frozen=True)
 class DynamicResponse:
-    """Results of all channels."""
+    """Results of a dynamic response for all channels, with the scatter of the stamps and warnings."""
 
     channels: tuple[ChannelResponse, ...]
     stamp_scatter_s: float
@@ -108,7 +110,10 @@ def analyse_response(
     warnings: list[str] = []
     for recording in recordings:
         channel, directions, frequency_hz = _swung(recording)
-        found = response(samples_of(recording, channel, directions), frequency_hz, noise.get(channel))
+        require_measured_pace(recording.info)
+        samples = samples_of(recording, channel, directions)
+        found = response(samples, frequency_hz, noise.get(channel))
+        require_pace(samples, found)
         by_channel.setdefault(channel, []).append(_with_its_noise(found, warnings))
     for channel, responses in by_channel.items():
         if (count := len({r.frequency_hz for r in responses})) < PARAMETERS:
@@ -136,7 +141,9 @@ def _swung(recording: Recording) -> tuple[str, list[float], float]:
 
 
 def table_axes_b(angles: TableAngles) -> Array:
-    """Directions of outer, middle and inner axis in the unit's axes, (3, 3); see `core.frames.table_rotation`."""
+    """Return the directions of outer, middle and inner axis in the unit's axes, (3, 3); see
+    `core.frames.table_rotation`.
+    """
     within_middle = table_rotation(TableAngles(0.0, 0.0, angles.inner_deg)).inv()
     outer = table_rotation(angles).inv().apply(np.array([0.0, 1.0, 0.0]))
     return np.array([outer, within_middle.apply(np.array([0.0, 0.0, 1.0])), [1.0, 0.0, 0.0]])
@@ -176,7 +183,7 @@ def _of_channel(c: ChannelResponse) -> list[str]:
     if abs(ppm) > CLOCK_SIGMAS * sd:
         found.append(
             f"{c.channel}: the unit's clock differs from the bench's by {ppm:.4g} ± {sd:.2g} ppm; the delay is that "
-            "of the recordings' middles"
+            "of the recordings' middles, and its uncertainty allows for the others"
         )
     return found
 
@@ -189,14 +196,17 @@ def _channel(
     bandwidth_hz, bandwidth_sd_hz = lag.bandwidth_hz or (None, None)
     highest = max(r.frequency_hz for r in responses)
     drift, drift_sd = _clock(responses)
+    differs = abs(drift) > CLOCK_SIGMAS * drift_sd
+    clock_sd_s = abs(drift) * float(np.mean([r.length_s for r in responses])) / sqrt(12.0) if differs else 0.0
     return ChannelResponse(
         channel=name,
         gain=gain,
         gain_standard_uncertainty=gain * sqrt(float(lag.covariance[0, 0])),
         delay_s=lag.delay_s,
-        delay_standard_uncertainty_s=hypot(lag.delay_sd_s, encoder_sd_s),
+        delay_standard_uncertainty_s=hypot(lag.delay_sd_s, encoder_sd_s, clock_sd_s),
         delay_from_noise_s=lag.delay_sd_s,
         delay_from_encoder_s=encoder_sd_s,
+        delay_from_clock_s=clock_sd_s,
         delay_degrees_of_freedom=freedom if scatter_s > 0.0 else None,
         time_constant_s=constant_s,
         time_constant_standard_uncertainty_s=constant_sd_s,

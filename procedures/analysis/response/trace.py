@@ -42,7 +42,7 @@ class Readings:
 
 @dataclass(frozen=True)
 class Samples:
-    """One gyro channel and the encoder beside it."""
+    """Samples of one gyro channel over a recording, with the encoder readings about its axis."""
 
     label: str
     rate_hz: float

@@ -27,7 +27,7 @@ PASSES = 2
 
 @dataclass(frozen=True)
 class CoefficientsSoFar:
-    """The twelve coefficients after the first station, the second, …; rows in the order of the stations."""
+    """The twelve coefficients after the first station, the second, …; one row a station, in their order."""
 
     triad: str
     output_unit: str

@@ -131,7 +131,7 @@ def read_program(text: str, axes: Sequence[str] = AXES) -> tuple[Dwell, ...]:
 
 
 def refusal(line: int, code: str, expected: str) -> BadParameter:
-    """Refusal of a line that cannot be read: its text, its number, and the expected form."""
+    """Return the error to raise for a line that cannot be read: its text, its number, and the expected form."""
     shown = code if len(code) <= SHOWN else code[:SHOWN] + "…"
     return BadParameter("program", shown, f"line {line}: expected {expected}")
 

@@ -44,12 +44,16 @@ class DwellRecord:
 
 
 def mean_sd(noise: NoiseCoefficients, start_s: float, stop_s: float) -> float:
-    """Standard uncertainty of a mean over [start, stop] since launch as the channel's output of that launch [rate]."""
+    """Return the standard uncertainty of a mean over [start, stop] since launch as the channel's output of that launch
+    [rate].
+    """
     return float(np.sqrt(mean_covariance(noise, [[start_s, stop_s]])[0, 0]))
 
 
 def dwell_records(recordings: Sequence[Recording], stations: Sequence[Station], unit: Unit) -> tuple[DwellRecord, ...]:
-    """Records of the dwells, one a station. Raises `UnfitRecording` unless recordings match the stations in order."""
+    """Return the records of the dwells, one a station. Raises `UnfitRecording` unless recordings match the stations in
+    order.
+    """
     told = [r.info.station for r in recordings]
     for i, station in enumerate(stations):
         if i >= len(told) or told[i] is None or told[i] != station:

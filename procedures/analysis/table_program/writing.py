@@ -1,4 +1,6 @@
-"""Writes a position program in the language that `dialect` reads, and holds the positions of the thesis's own."""
+"""Writes a position program in the language that `dialect` reads; also has the positions of the thesis's own
+program.
+"""
 
 from collections.abc import Iterable, Sequence
 
@@ -34,7 +36,7 @@ def write_program(dwells: Iterable[Dwell], axes: Sequence[str] = AXES) -> str:
 
 
 def dwells_at(positions: Iterable[tuple[float, float, float, float]]) -> tuple[Dwell, ...]:
-    """Dwells from (outer, middle, inner) [deg] and delay [s]."""
+    """Return dwells from (outer, middle, inner) [deg] and delay [s]."""
     return tuple(Dwell(TableAngles(outer, middle, inner), delay) for outer, middle, inner, delay in positions)
 
 

@@ -25,7 +25,9 @@ class ZeroAndScale:
 
 
 def zero_and_scale(current_ma: float, plus_code: Array, minus_code: Array) -> ZeroAndScale:
-    """Compute zero and scale from mean codes (n,) at currents ±I [mA]. Raises `BadParameter`, `UnfitRecording`."""
+    """Return zero and scale at each soak from mean codes (n,) at currents ±I [mA]. Raises `BadParameter`,
+    `UnfitRecording`.
+    """
     if not 0.0 < current_ma < np.inf:
         raise BadParameter("current_ma", current_ma, "finite and above 0")
     if len(plus_code) != len(minus_code) or not np.all(np.isfinite([*plus_code, *minus_code])):

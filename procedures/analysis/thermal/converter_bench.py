@@ -104,7 +104,9 @@ def fit_channels(
     gain_sd_ppm: float = 0.0,
     zero_sd_ma: float = 0.0,
 ) -> tuple[FittedChannel, FittedChannel, FittedChannel]:
-    """Models of x, y, z; `order` None: chosen for each function. Raises as `zero_and_scale` and `fit_normalised`."""
+    """Return the models of x, y, z; `order` None: chosen for each function. Raises as `zero_and_scale` and
+    `fit_normalised`.
+    """
     x, y, z = (
         _channel(soaks.codes[:, :, axis], soaks.sensor_c, current_ma, reference_c, order, gain_sd_ppm, zero_sd_ma)
         for axis in range(3)

@@ -58,7 +58,9 @@ def spectrum(residuals: Sequence[Array], cell_s: float) -> Spectrum:
 
 
 def whiten(values: Array, variances: Array) -> Array:
-    """Cosines of values (n,) or columns (n, m) over the roots of their variances (n,): as long, and white."""
+    """Return the cosines of values (n,) or columns (n, m) over the roots of their variances (n,): as long, and
+    white.
+    """
     over = 1.0 / np.sqrt(variances)
     turned = np.asarray(dct(values, type=2, norm="ortho", axis=0), dtype=np.float64)
     return turned * (over if values.ndim == 1 else over[:, None])

@@ -1,4 +1,5 @@
-"""Does a signal follow a temperature? Pearson's r, and a test that knows the signal's noise (thesis tables 4.3, 4.6).
+"""Correlation of a signal with a temperature: Pearson's r, and a test that knows the signal's noise (thesis tables 4.3,
+4.6).
 
 Twelve hours of one-second samples are not 43 200 independent pairs: temperature moves in hours, and the noise of gyros
 and accelerometers is not white either. With X_k and Y_k the cosines of both and s_k the variances of the noise's,

@@ -26,7 +26,7 @@ SMALLEST_P = 1e-300
 
 @dataclass(frozen=True)
 class Series:
-    """Cell means of one recording."""
+    """Cell means of one recording's channel, the departure of its temperature from the reference, and its regime."""
 
     values: Array
     """Channel, (n,)."""
@@ -37,7 +37,9 @@ class Series:
 
 
 def designs(series: Sequence[Series], order: int) -> list[Array]:
-    """Intercepts of the recordings, then the powers, (n, recordings + order) each."""
+    """Return the design of each recording: intercepts of the recordings, then the powers, (n, recordings + order)
+    each.
+    """
     found: list[Array] = []
     for index, one in enumerate(series):
         heads = np.zeros((len(one.values), len(series)))
@@ -47,7 +49,9 @@ def designs(series: Sequence[Series], order: int) -> list[Array]:
 
 
 def fit_order(series: Sequence[Series], order: int, cell_s: float) -> LinearFit:
-    """Fit a polynomial by generalised least squares with the residuals' own noise. Raises `UnfitRecording`."""
+    """Return the fit of a polynomial by generalised least squares with the residuals' own noise. Raises
+    `UnfitRecording`.
+    """
     values = [s.values for s in series]
     return fit_linear(designs(series, order), values, [np.ones(len(v)) for v in values], cell_s)
 
@@ -79,7 +83,9 @@ def own_noise(series: Sequence[Series], order: int, cell_s: float) -> NoiseCoeff
 
 
 def joint_p_value(series: Sequence[Series], cell_s: float, noise: NoiseCoefficients | None = None) -> float:
-    """p-value of no dependence in all recordings together, by Fisher's ``−2·Σ ln p``. Raises `UnfitRecording`."""
+    """Return the p-value of no dependence in all recordings together, by Fisher's ``−2·Σ ln p``. Raises
+    `UnfitRecording`.
+    """
     found = [correlation(s.values, s.departure_c, cell_s, noise).p_value for s in series]
     return float(chdtrc(2 * len(found), -2.0 * sum(log(max(p, SMALLEST_P)) for p in found)))
 
@@ -87,7 +93,7 @@ def joint_p_value(series: Sequence[Series], cell_s: float, noise: NoiseCoefficie
 def unseen_p_value(
     series: Sequence[Series], order: int, cell_s: float, noise: NoiseCoefficients | None = None
 ) -> float | None:
-    """Joint p-value of what a fit to all other recordings leaves in each; None with a single recording."""
+    """Return the joint p-value of what a fit to all other recordings leaves in each; None with a single recording."""
     if len(series) < 2:
         return None
     left: list[Series] = []

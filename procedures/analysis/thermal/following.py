@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 from scipy.special import chdtrc
 
 from procedures.analysis.thermal.correlated import fit_linear
@@ -50,6 +49,8 @@ class Following:
 
 def _exact(x: Array, tau: float, sample_s: float, start: float) -> Array:
     """First-order lag of a series that goes in straight lines between samples, beginning at `start`."""
+    from scipy.signal import lfilter  # with all of scipy's statistics: only where it is called
+
     if tau <= 0.0:
         return x
     decay = float(np.exp(-sample_s / tau))
@@ -61,7 +62,9 @@ def _exact(x: Array, tau: float, sample_s: float, start: float) -> Array:
 
 
 def modelled(case_c: Array, sample_s: float, delay_s: float, case_lag_s: float, sensor_lag_s: float) -> Array:
-    """Readings of the converter's sensor, (n,), by readings of the case's (n,), without heating and first state."""
+    """Return the readings of the converter's sensor, (n,), by readings of the case's (n,), without heating and first
+    state.
+    """
     board = _exact(case_c, delay_s, sample_s, float(case_c[0]))
     board = board + case_lag_s * (case_c - board) / delay_s
     return _exact(board, sensor_lag_s, sample_s, float(board[0]))

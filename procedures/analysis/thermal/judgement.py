@@ -18,15 +18,17 @@ from procedures.core.errors import BadParameter, UnfitRecording
 
 
 class Corrects(Protocol):
-    """A map of outputs and temperatures to specific forces: `ThermalCorrection`, or an alternative to compare with."""
+    """A map of outputs and temperatures to specific forces: `ThermalCorrection`, or an alternative to compare with.
+    Interface.
+    """
 
     @property
     def scales(self) -> Array:
-        """K0 of each axis, (3,)."""
+        """Scale K0 of each axis, (3,)."""
         ...
 
     def apply(self, output_m_s2: Array, case_c: Array, converter_c: Array, dynamic: ArrayLike) -> Array:
-        """Specific forces (n, 3) [m/s²]."""
+        """Return specific forces (n, 3) [m/s²] of outputs (n, 3) at sensor temperatures [°C]."""
         ...
 
 
@@ -41,7 +43,7 @@ class Soak:
 
 
 def soaks(run: ThermalRun, least_s: float = 900.0) -> tuple[Soak, ...]:
-    """Stretches of the static regime that last at least `least_s` [s]. Raises `BadParameter`."""
+    """Return the stretches of the static regime that last at least `least_s` [s]. Raises `BadParameter`."""
     if not 0.0 < least_s < np.inf:
         raise BadParameter("least_s", least_s, "finite and above 0")
     edges = np.flatnonzero(np.diff(np.concatenate([[1], run.dynamic.astype(np.int8), [1]])))
@@ -79,12 +81,12 @@ class ThreeSigma:
 
 
 def corrected(run: ThermalRun, correction: Corrects) -> Array:
-    """Specific forces of a run's cells, (n, 3) [m/s²]."""
+    """Return the specific forces of a run's cells, (n, 3) [m/s²]."""
     return correction.apply(run.output_m_s2, run.case_c, run.converter_c, run.dynamic)
 
 
 def three_sigma(run: ThermalRun, correction: Corrects, reference: Soak, at: Soak) -> ThreeSigma:
-    """Errors 3σ before and after at a soak, relative to the run's own reference soak."""
+    """Return the errors 3σ before and after correction at a soak, relative to the run's own reference soak."""
     before = run.output_m_s2 * correction.scales
     after = corrected(run, correction)
     own, zero = slice(at.start, at.stop), slice(reference.start, reference.stop)
@@ -105,7 +107,7 @@ class Magnitude:
 
 
 def magnitude(run: ThermalRun, correction: Corrects, gravity_m_s2: float) -> Magnitude:
-    """|ĝ| − g over a run of the corrected triad."""
+    """Return |ĝ| − g over a run of the corrected triad."""
     errors = np.linalg.norm(corrected(run, correction), axis=1) - gravity_m_s2
     about = errors - np.mean(errors)
     still, moving = about[~run.dynamic], about[run.dynamic]

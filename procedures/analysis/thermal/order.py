@@ -27,7 +27,7 @@ class Order:
         return 1 + int(np.argmin(self.bic))
 
     def reason(self, used: int) -> str:
-        """Reason for or against a used order in one sentence."""
+        """Return the reason for or against a used order, in one sentence."""
         tests = ", ".join(f"{k + 1} against {k} p = {p:.2g}" for k, p in enumerate(self.p_value, start=1))
         best = self.preferred
         least = min(self.bic)
@@ -62,7 +62,9 @@ def compare_orders(
 
 
 def f_test(fewer: float, more: float, k_fewer: int, k_more: int, count: float) -> float:
-    """p-value of ``F = ((rss₁ − rss₂)/(k₂ − k₁))/(rss₂/(m − k₂))``, m independent values; 1 where it says nothing."""
+    """Return the p-value of ``F = ((rss₁ − rss₂)/(k₂ − k₁))/(rss₂/(m − k₂))``, m independent values; 1 where it says
+    nothing.
+    """
     if count <= k_more or k_more <= k_fewer:
         return 1.0
     statistic = (fewer - more) / (k_more - k_fewer) / (more / (count - k_more))

@@ -28,14 +28,16 @@ STUCK_C = 5.0
 
 
 class CheckedSamples:
-    """Picks the samples of a stream that are judged: the last of every `CHECK_S`, counted through its blocks."""
+    """Selects the samples of a stream that are judged: the last of every `CHECK_S`, counted through its blocks."""
 
     def __init__(self, rate_hz: float) -> None:
         self._step = max(1, round(CHECK_S * rate_hz))
         self._taken = 0
 
     def of_block(self, length: int) -> list[tuple[int, float]]:
-        """Row in the stream's next block of `length` samples, and time since its beginning [s], of each of them."""
+        """Return, for each judged sample of the stream's next block of `length`, its row in the block and its time
+        since the beginning [s].
+        """
         before, step = self._taken, self._step
         self._taken += length
         due = range((before // step + 1) * step, self._taken + 1, step)
@@ -91,7 +93,7 @@ class ReadingSteps:
         self._rose_s = self._fell_s = -np.inf
 
     def take(self, t_s: float, reading_c: float) -> None:
-        """Add one reading to the window."""
+        """Take in one reading at a time [s]."""
         if self._last is None:
             self._last, self._changed_s = reading_c, t_s
         change = reading_c - self._last
@@ -105,14 +107,14 @@ class ReadingSteps:
             self._fell_s = t_s
 
     def hidden_c_min(self, t_s: float, window_s: float) -> float:
-        """The greatest drift that the readings may hide [°C/min]."""
+        """Return the greatest drift that the readings may hide [°C/min]."""
         if min(self._rose_s, self._fell_s) >= t_s - window_s:
             return 0.0
         return self.resolution_c / max(window_s, t_s - self._changed_s) * MINUTE_S
 
 
 class ProfileProgress:
-    """State along a profile. `leg` is the present one, None when all are done."""
+    """Progress along a temperature profile. `leg` is the present one, None when all are done."""
 
     def __init__(self, profile: TemperatureProfile) -> None:
         self.profile = profile
@@ -189,7 +191,7 @@ class ProfileProgress:
         return ""
 
     def why_late(self, air_c: float) -> str:
-        """Sentence on the criteria that the present leg does not meet."""
+        """Return a sentence on the criteria that the present leg does not meet."""
         leg, criterion = self.leg, self.profile.criterion
         if leg is None:
             return "nothing is late"
@@ -226,7 +228,7 @@ class ProfileProgress:
 
 
 class SensorWatch:
-    """Judges the unit's temperature sensors, reading by reading; plain arithmetic, for it runs thousands of times."""
+    """Checks the unit's temperature sensors, reading by reading; plain arithmetic, for it runs thousands of times."""
 
     def __init__(self, profile: TemperatureProfile) -> None:
         low, high = profile.span_c

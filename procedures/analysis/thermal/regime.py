@@ -104,7 +104,7 @@ class RegimeIndicator:
         self._quiet_s = 0.0
 
     def step(self, temperature_c: float) -> RegimeSample:
-        """The regime after one more sample [°C]. Raises `UnfitRecording` where it is not a number."""
+        """Return the regime after one more sample [°C]. Raises `UnfitRecording` where it is not a number."""
         if not isfinite(temperature_c):
             raise UnfitRecording(f"the case temperature {temperature_c!r} is not a number: no regime can be found")
         level, slope, bend = self._state or (temperature_c, 0.0, 0.0)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace, regimes
 from procedures.core.arrays import Array
@@ -25,6 +24,8 @@ def without_lag(reading_c: Array, sample_s: float, lag_s: float, window_s: float
     ``τ²·T''/2``. Also what stage one should be given: a converter that drifts 1e-4 m/s²/°C, read 5 s late on a ramp of
     1 °C/min, is 8e-6 m/s² wrong. Raises `BadParameter`, `UnfitRecording`.
     """
+    from scipy.signal import savgol_filter  # with all of scipy's statistics: only where it is called
+
     if not 0.0 <= lag_s < np.inf:
         raise BadParameter("lag_s", lag_s, "finite and not negative")
     samples = 2 * round(0.5 * window_s / sample_s) + 1
@@ -54,7 +55,7 @@ class ThermalRun:
     """Specific force along the true input axis of each accelerometer: gravity and zero for an ideal mounting."""
 
     def case(self, axis: int) -> Array:
-        """Static regressor of an axis, (n,)."""
+        """Return the static regressor of an axis, (n,) [°C]."""
         return self.case_c if self.case_c.ndim == 1 else self.case_c[:, axis]
 
 

@@ -60,7 +60,9 @@ class SoakSettings:
                 raise BadParameter(name, value, "finite and above 0")
 
     def unsoaked_c(self, step_c: Array) -> Array:
-        """Rest of a step of the chamber's temperature that the unit has not followed, ``|step|·e^{−soak/τ}`` [°C]."""
+        """Return the rest of a step of the chamber's temperature that the unit has not followed, ``|step|·e^{−soak/τ}``
+        [°C].
+        """
         return np.abs(step_c) * np.exp(-self.soak_s / self.time_constant_s)
 
 
@@ -80,7 +82,7 @@ class Soaked:
 
 
 def read_soaks(recordings: Sequence[Recording], settings: SoakSettings) -> Soaked:
-    """Cold starts of the unit's sensors. Raises `UnfitRecording`, `MissingChannel`."""
+    """Return the readings of the unit's sensors at cold starts. Raises `UnfitRecording`, `MissingChannel`."""
     targets: list[float] = []
     air: list[float] = []
     found: list[tuple[Array, Array]] = []
@@ -170,7 +172,7 @@ class UpAgainstDown:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """The sensors' calibration as a whole."""
+    """Calibration of all temperature sensors of a unit: lines, correction, hysteresis."""
 
     sensors: tuple[SensorFit, ...]
     correction: ThermometerCorrection
@@ -233,7 +235,9 @@ def calibrate(soaked: Soaked, settings: SoakSettings) -> Calibrated:
 
 
 def both_ways(targets_c: Sequence[float]) -> list[tuple[float, list[int], list[int]]]:
-    """Targets that a sequence of soaks reaches from below and from above, with the indices of both kinds of soaks."""
+    """Return the targets that a sequence of soaks reaches from below and from above, with the indices of both kinds of
+    soaks.
+    """
     ways = [np.sign(b - a) for a, b in pairwise(targets_c)]
     found: list[tuple[float, list[int], list[int]]] = []
     for target in sorted(set(targets_c)):

@@ -30,7 +30,7 @@ from procedures.core.unit import TriadRecord
 
 
 def turn_parts(record: TriadRecord | None, windows: Array) -> list[Part]:
-    """Noise of the integrated outputs [rad] of recordings that last `windows` (n, 2), process by process."""
+    """Return the noise of the integrated outputs [rad] of recordings that last `windows` (n, 2), process by process."""
     if record is None:
         return []
     seconds = windows[:, 1] - windows[:, 0]
@@ -41,7 +41,9 @@ def turn_parts(record: TriadRecord | None, windows: Array) -> list[Part]:
 def turn_budgets(
     fit: TurnFit, names: Sequence[CoefficientName], parts: Sequence[Part], flaws: TableErrors
 ) -> tuple[Budget, ...]:
-    """The budget of each coefficient, in the order of `names`; without `parts` the noise is that of the residuals."""
+    """Return the budget of each coefficient, in the order of `names`; without `parts` the noise is that of the
+    residuals.
+    """
     made = fit.estimator
     of_parts = part_rows(parts, made.gain.reshape(len(names), 3, -1))
     sources = [s for s in dict.fromkeys(made.source) if np.any(made.of_source(s) > 0.0)]

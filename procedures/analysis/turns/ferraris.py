@@ -42,7 +42,9 @@ END_REST_S = 2.0
 def face_stations(
     rest_s: float, turns: int, rate_deg_s: float, ramp_s: float, settle_s: float, end_rest_s: float = END_REST_S
 ) -> tuple[Station, ...]:
-    """Each face in turn: at rest, then whole turns there and back, each recording ending at rest for `end_rest_s`."""
+    """Return the stations of each face in turn: at rest, then whole turns there and back, each recording ending at rest
+    for `end_rest_s`.
+    """
     made: list[Station] = []
     for face, angles in FACES.items():
         made.append(Station(len(made), f"{face} at rest", angles, None, settle_s, rest_s))
@@ -54,7 +56,9 @@ def face_stations(
 
 
 def rests_and_turns(stations: Sequence[Station], seconds: Array, site: Site) -> Turning:
-    """Motion of stations of which some turn and some rest, in their order. Raises `BadParameter` as `turning`."""
+    """Return the motion of stations of which some turn and some rest, in their order. Raises `BadParameter` as
+    `turning`.
+    """
     turns = [s.turn is not None for s in stations]
     moving = turning([s for s in stations if s.turn is not None], np.asarray(seconds)[turns], site)
     angles = tuple(s.angles or TableAngles() for s in stations)
@@ -69,7 +73,9 @@ def rests_and_turns(stations: Sequence[Station], seconds: Array, site: Site) -> 
 
 
 def ferraris_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableErrors:
-    """Flaws of the turned angles as of whole turns, and of the Earth's turn at rest by all that the table declares."""
+    """Return the flaws of the turned angles as of whole turns, and of the Earth's turn at rest by all that the table
+    declares.
+    """
     made = turn_flaws(motion, uncertainty)
     rest = motion.angle_rad == 0.0
     of_rest = table_errors(motion.angles, motion.earth_rad, uncertainty, of_gravity=False)
@@ -78,18 +84,19 @@ def ferraris_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableError
     return replace(made, sd=sd)
 
 
-def ferraris_estimator(
-    motion: Turning, noise: Array | None, uncertainty: TableUncertainty, matrix: Array
-) -> TurnEstimator:
-    """Estimator of b and K over rests and turns; `noise` (3, n, n) of the station means. Raises `Undetermined`."""
+def ferraris_estimator(motion: Turning, noise: Array | None, flaws: TableErrors, matrix: Array) -> TurnEstimator:
+    """Estimator of b and K over rests and turns; `noise` (3, n, n) of the station means. Raises `Undetermined`.
+
+    `flaws`: those of the table on this motion (`ferraris_flaws`).
+    """
     slopes = motion.axis_b @ matrix.T
-    return turn_estimator(motion, slopes, (), units.DEG, noise, ferraris_flaws(motion, uncertainty), matrix)
+    return turn_estimator(motion, slopes, (), units.DEG, noise, flaws, matrix)
 
 
 def analyse_ferraris(
     recordings: Sequence[Recording], site: Site, uncertainty: TableUncertainty, record: TriadRecord | None
 ) -> WholeTurns:
-    """The gyro triad from recordings of faces at rest and turning. Raises `UnfitRecording`, `Undetermined`."""
+    """Return the gyro triad from recordings of faces at rest and turning. Raises `UnfitRecording`, `Undetermined`."""
     means = station_means(recordings, "gyro")
     if means.output_unit != "rad/s":
         raise UnfitRecording(f"the gyro channels are in {means.output_unit}: whole turns need a nominal scale in rad")
@@ -101,15 +108,16 @@ def analyse_ferraris(
     labels = [label for label, turned in zip(means.labels, turns, strict=True) if turned]
     require_turns(only(motion, turns), outputs[turns], labels)
     noise = triad_covariance(record, means.windows)
-    first = ferraris_estimator(motion, None, uncertainty, np.eye(3))
+    flaws = ferraris_flaws(motion, uncertainty)
+    first = ferraris_estimator(motion, None, flaws, np.eye(3))
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]
-    fit = fitted(ferraris_estimator(motion, noise, uncertainty, matrix), outputs, noise is not None)
+    fit = fitted(ferraris_estimator(motion, noise, flaws, matrix), outputs, noise is not None)
     found = whole_turns(fit, (), motion, outputs, np.flatnonzero(turns).tolist(), noise is not None)
-    return with_budgets(found, fit, record, means.windows, ferraris_flaws(motion, uncertainty))
+    return with_budgets(found, fit, record, means.windows, flaws)
 
 
 def faces_of(recordings: Sequence[Recording]) -> list[Station]:
-    """Stations of the recordings, some at rest and some of whole turns. Raises `UnfitRecording`."""
+    """Return the stations of the recordings, some at rest and some of whole turns. Raises `UnfitRecording`."""
     stations = [r.info.station for r in recordings]
     for recording, station in zip(recordings, stations, strict=True):
         if station is None or station.angles is None:
@@ -122,17 +130,17 @@ def faces_of(recordings: Sequence[Recording]) -> list[Station]:
 
 
 def rests(recordings: Sequence[Recording]) -> list[Recording]:
-    """The recordings at rest, for the accelerometers."""
+    """Return the recordings at rest, for the accelerometers."""
     return [r for r in recordings if r.info.station is not None and r.info.station.turn is None]
 
 
 def rest_means(recordings: Sequence[Recording]) -> StationMeans:
-    """Means of the accelerometers over the faces at rest."""
+    """Return the means of the accelerometers over the faces at rest. Raises `UnfitRecording`, `MissingChannel`."""
     return station_means(rests(recordings), "accelerometer")
 
 
 def only(motion: Turning, which: Array) -> Turning:
-    """The motion of some of the stations."""
+    """Return the motion of some of the stations, by a mask (n,)."""
     angles = tuple(a for a, taken in zip(motion.angles, which, strict=True) if taken)
     fields = ("seconds", "axis_b", "angle_rad", "rate_rad_s", "earth_rad", "moments", "earth_rate_b")
     return replace(motion, **{name: getattr(motion, name)[which] for name in fields}, angles=angles)

@@ -157,7 +157,7 @@ def turn_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableErrors:
 
 
 def parameter_names(terms: Sequence[Term]) -> tuple[str, ...]:
-    """Per channel, in the order of the design's columns."""
+    """Return the names of a channel's parameters, in the order of the design's columns."""
     return ("b", "K1", "K2", "K3", *terms)
 
 
@@ -203,7 +203,7 @@ class TurnEstimator:
         return self.noise_covariance + self.table_per_sd @ self.table_per_sd.T
 
     def of_source(self, source: str) -> Array:
-        """Standard uncertainties (3k,) from one of the table's flaws."""
+        """Return the standard uncertainties (3k,) from one of the table's flaws."""
         return np.sqrt(np.sum(self.table_per_sd[:, [s == source for s in self.source]] ** 2, axis=1))
 
 
@@ -271,10 +271,12 @@ def fit_turns(
     terms: Sequence[Term],
     reference_rad_s: float,
     noise: Array | None,
-    uncertainty: TableUncertainty,
+    flaws: TableErrors,
 ) -> TurnFit:
-    """Fit integrated outputs (n, 3) [rad]; K and slopes for the weights come from plain least squares beforehand."""
-    flaws = turn_flaws(motion, uncertainty)
+    """Fit integrated outputs (n, 3) [rad]; K and slopes for the weights come from plain least squares beforehand.
+
+    `flaws`: those of the table on this motion (`turn_flaws`).
+    """
     slopes = outputs / motion.angle_rad[:, None]
     first = turn_estimator(motion, slopes, (), reference_rad_s, None, flaws, np.eye(3))
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]
@@ -283,7 +285,7 @@ def fit_turns(
 
 
 def fitted(plan: TurnEstimator, outputs: Array, noise_known: bool) -> TurnFit:
-    """Fit integrated outputs (n, 3) [rad] by an estimator; unknown noise is scaled to the residuals."""
+    """Return the fit of integrated outputs (n, 3) [rad] by an estimator; unknown noise is scaled to the residuals."""
     parameters = (plan.gain @ outputs.T.ravel()).reshape(3, -1)
     modelled = np.einsum("cnk,ck->nc", plan.design, parameters)
     residuals = outputs - modelled

@@ -36,12 +36,13 @@ class HalfTurns:
     pairs: int
 
     def coverage_factor(self, confidence: float) -> float:
-        """Student's factor of an interval of that confidence (two-sided)."""
+        """Return Student's factor of an interval of that confidence (two-sided)."""
         return float(stdtrit(self.pairs - 1, 0.5 + 0.5 * confidence))
 
 
 def half_turns(means: Array, mean_sd: Array, turned: NDArray[np.bool_]) -> HalfTurns:
-    """Reduce the means (n, 3) of dwells, in the order they were made, with uncertainties (n, 3) and turned headings.
+    """Return half differences and half sums from the means (n, 3) of dwells, in the order they were made, with
+    uncertainties (n, 3) and turned headings.
 
     Each dwell pairs with the next if that is at the other heading. Raises `UnfitRecording` of too few pairs.
     """

@@ -37,11 +37,13 @@ class TurnProgram:
     settle_s: float
 
     def turns(self, rate_deg_s: float) -> int:
-        """Number of whole turns at a rate, at least one."""
+        """Return the number of whole turns at a rate, at least one."""
         return max(1, floor(rate_deg_s * self.turning_s / 360.0 + 0.5))
 
     def stations(self) -> tuple[Station, ...]:
-        """Axis after axis, rate after rate, forth and back. Raises `BadParameter` where a rate would not be reached."""
+        """Return the stations, axis after axis, rate after rate, forth and back. Raises `BadParameter` where a rate
+        would not be reached.
+        """
         made: list[Station] = []
         for axis, angles in UPRIGHT.items():
             for rate in self.rates_deg_s:
@@ -93,12 +95,12 @@ class TurnPlan:
         return None if noise is None else made
 
     def times_longer(self, factor: int) -> "TurnPlan":
-        """Plan with the same rates, each for `factor` times as long."""
+        """Return the plan with the same rates, each for `factor` times as long."""
         return replace(self, program=replace(self.program, turning_s=factor * self.program.turning_s))
 
 
 def coefficient_names(terms: Sequence[Term]) -> tuple[str, ...]:
-    """Coefficient names of all three channels: "b_x", "K11", …, "asymmetry_x", …"""
+    """Return the coefficient names of all three channels: "b_x", "K11", …, "asymmetry_x", …"""
     return tuple(
         f"K{number}{name[1]}" if name.startswith("K") else f"{name}_{axis}"
         for number, axis in enumerate(AXES, start=1)
@@ -107,7 +109,7 @@ def coefficient_names(terms: Sequence[Term]) -> tuple[str, ...]:
 
 
 def scale_factor_sd(made: TurnEstimator, terms: Sequence[Term]) -> tuple[float, float, float]:
-    """Standard uncertainties of K11, K22, K33."""
+    """Return the standard uncertainties of K11, K22, K33."""
     sd = np.sqrt(np.diagonal(made.covariance))
     names = coefficient_names(terms)
     x, y, z = (float(sd[names.index(f"K{i}{i}")]) for i in (1, 2, 3))
@@ -132,7 +134,7 @@ def longer_needed(plan: TurnPlan, limit: float) -> int | None:
 
 
 def bench_time_s(plan: TurnPlan) -> tuple[float, tuple[float, ...]]:
-    """Bench time of the whole plan and of each axis of the unit, moves and settling included [s]."""
+    """Return the bench time of the whole plan and of each axis of the unit, moves and settling included [s]."""
     stations = plan.program.stations()
     ends = windows(stations, plan.axes)[:, 1]
     per_axis = np.diff([0.0, *ends[len(stations) // 3 - 1 :: len(stations) // 3].tolist()])

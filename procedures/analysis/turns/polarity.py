@@ -70,7 +70,9 @@ def _answer(recording: Recording, names: Sequence[str], triad: str, turned_s: fl
 
 
 def sentences(both: Sequence[Answers]) -> tuple[str, ...]:
-    """Faults of each triad, and whether a turned mounting would explain it; empty for a good unit."""
+    """Return the faults of each triad, and whether a turned mounting would explain it, as sentences; empty for a good
+    unit.
+    """
     wrong = [a for a in both if a.axes != ("+x", "+y", "+z")]
     said = [wrong_axes(a.triad, a.axes) for a in wrong]
     made = [a.permutation for a in wrong]

@@ -65,7 +65,7 @@ class WholeTurns:
     """Uncertainty budget of each coefficient; empty in results of older versions."""
 
     def coefficient(self, name: str) -> Coefficient:
-        """Look up a coefficient by its name without the triad: "K11", "asymmetry_x"."""
+        """Return a coefficient by its name without the triad: "K11", "asymmetry_x"."""
         return next(c for c in self.coefficients if c.name.symbol == name)
 
 
@@ -93,9 +93,10 @@ def analyse_turns(
     motion = as_turned(motion, recordings, site)
     noise = triad_covariance(record, means.windows)
     reference = reference_rate_deg_s * units.DEG
-    fit = fit_turns(motion, outputs, terms, reference, noise, uncertainty)
+    flaws = turn_flaws(motion, uncertainty)
+    fit = fit_turns(motion, outputs, terms, reference, noise, flaws)
     made = whole_turns(fit, terms, motion, outputs, range(len(outputs)), noise is not None)
-    made = with_budgets(made, fit, record, means.windows, turn_flaws(motion, uncertainty))
+    made = with_budgets(made, fit, record, means.windows, flaws)
     return replace(made, reference_rate_deg_s=reference_rate_deg_s)
 
 
@@ -107,7 +108,7 @@ def whole_turns(
     turning_stations: Sequence[int],
     noise_known: bool,
 ) -> WholeTurns:
-    """Numbers of a fit, ready to be stored; the rate points are those of the stations that turn."""
+    """Return the numbers of a fit, ready to be stored; the rate points are those of the stations that turn."""
     return WholeTurns(
         _coefficients(fit, terms),
         _calibration(fit),
@@ -124,7 +125,9 @@ def whole_turns(
 def with_budgets(
     found: WholeTurns, fit: TurnFit, record: TriadRecord | None, windows: Array, flaws: TableErrors
 ) -> WholeTurns:
-    """The result with the budget of each coefficient; `windows` (n, 2) of the recordings, `flaws` of the table."""
+    """Return the result with the budget of each coefficient; `windows` (n, 2) of the recordings, `flaws` of the
+    table.
+    """
     parts = turn_parts(record if found.noise_known else None, windows)
     return replace(found, budgets=turn_budgets(fit, [c.name for c in found.coefficients], parts, flaws))
 
@@ -138,7 +141,9 @@ def _stations(recordings: Sequence[Recording]) -> list[Station]:
 
 
 def require_turns(motion: Turning, outputs: Array, labels: Sequence[str]) -> None:
-    """Check that each station's own channel counted about the turns that were made, in their direction."""
+    """Check that each station's own channel counted about the turns that were made, in their direction. Raises
+    `UnfitRecording`.
+    """
     for i, channel in enumerate(motion.channels):
         made = motion.angle_rad[i] * np.sign(motion.axis_b[i, channel])
         if not abs(outputs[i, channel] / made - 1.0) < PLAUSIBLE:

@@ -70,7 +70,7 @@ class WarmUp:
     fit: Fit
 
     def curve(self, t_s: Array) -> Array:
-        """The transient at times since power-up, none before the record, shape of `t_s` [rate]."""
+        """Return the transient at times since power-up, none before the record, shape of `t_s` [rate]."""
         return self.fit.at(np.asarray(t_s, dtype=np.float64) - self.start_s)
 
 

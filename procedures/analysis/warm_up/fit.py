@@ -46,16 +46,18 @@ class Fit:
         return np.concatenate([[a, *own] for a, own in zip(self.amplitudes, self.own, strict=True)] or [np.empty(0)])
 
     def at(self, x: Array) -> Array:
-        """The transient at times x [s] from the first cell's beginning, shape of x [rate]."""
+        """Return the transient at times x [s] from the first cell's beginning, shape of x [rate]."""
         return curve(self.shapes, self.parameters, x)
 
     def cells(self, edges_s: Array) -> Array:
-        """Means of the transient between neighbouring edges (n+1,) [s] from the first cell's beginning, (n,) [rate]."""
+        """Return the means of the transient between neighbouring edges (n+1,) [s] from the first cell's beginning, (n,)
+        [rate].
+        """
         return means(self.shapes, self.parameters, edges_s)
 
 
 def curve(shapes: tuple[Shape, ...], parameters: Array, x: Array) -> Array:
-    """A sum of shapes at times x [s], shape of x; `parameters` as in `Fit`."""
+    """Return a sum of shapes at times x [s], shape of x; `parameters` as in `Fit`."""
     total, amplitudes, own = np.zeros(x.shape), *_split(shapes, parameters)
     for shape, amplitude, parameter in zip(shapes, amplitudes, own, strict=True):
         total += amplitude * value(shape, x, parameter)
@@ -63,7 +65,7 @@ def curve(shapes: tuple[Shape, ...], parameters: Array, x: Array) -> Array:
 
 
 def means(shapes: tuple[Shape, ...], parameters: Array, edges_s: Array) -> Array:
-    """Means of a sum of shapes between neighbouring edges (n+1,) [s], (n,); `parameters` as in `Fit`."""
+    """Return the means of a sum of shapes between neighbouring edges (n+1,) [s], (n,); `parameters` as in `Fit`."""
     total, amplitudes, own = np.zeros(len(edges_s) - 1), *_split(shapes, parameters)
     for shape, amplitude, parameter in zip(shapes, amplitudes, own, strict=True):
         total += amplitude * cell_means(shape, edges_s, parameter)
@@ -77,7 +79,7 @@ def _split(shapes: tuple[Shape, ...], parameters: Array) -> tuple[Array, tuple[A
 
 @dataclass(frozen=True)
 class Family:
-    """One shape over a grid of its parameter."""
+    """One shape of a transient over a grid of its parameter, with the cosines of each."""
 
     shape: Shape
     grid: Array
@@ -87,7 +89,7 @@ class Family:
 
     @classmethod
     def over(cls, series: CosineSeries, shape: Shape, shortest: float, longest: float) -> "Family":
-        """Build the grid from `shortest` cells to `longest` records, with `PER_E_FOLD` points per factor e."""
+        """Return the grid from `shortest` cells to `longest` records, with `PER_E_FOLD` points per factor e."""
         low, high = np.log(shortest * series.cell_s), np.log(longest * series.edges_s[-1])
         grid = np.linspace(low, high, max(2, round(PER_E_FOLD * (high - low))))
         curves = [cell_means(shape, series.edges_s, g[None]) for g in grid]
@@ -95,17 +97,17 @@ class Family:
 
 
 def exponentials(series: CosineSeries) -> Family:
-    """The exponentials over the range of time constants."""
+    """Return the exponentials over the range of time constants."""
     return Family.over(series, exponential, SHORTEST, LONGEST)
 
 
 def no_transient(series: CosineSeries) -> Fit:
-    """The fit of noise alone, without any shape."""
+    """Return the fit of noise alone, without any shape."""
     return Fit((), (), np.empty(0), np.empty((0, 0)), fit_noise(series.coefficients, series.unit_variances), 1.0)
 
 
 def fit_exponentials(series: CosineSeries, significance: float) -> Fit:
-    """Fit none, one or two exponentials: each is added if significant, or both at once."""
+    """Return the fit of none, one or two exponentials: each is added if significant, or both at once."""
     family, none = exponentials(series), no_transient(series)
     ones = candidates(series, none, (family,), significance)
     if not ones:
@@ -128,7 +130,7 @@ def pair(series: CosineSeries, none: Fit, family: Family, significance: float) -
 
 
 def noise_left(series: CosineSeries, transient: Array) -> FittedNoise:
-    """Fit the noise of the residuals of a transient, cell means (n,)."""
+    """Return the noise fitted to the residuals of a transient, cell means (n,)."""
     return fit_noise(series.coefficients - cosines(transient), series.unit_variances)
 
 

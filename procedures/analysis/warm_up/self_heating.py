@@ -45,13 +45,13 @@ class SelfHeating:
         return np.sqrt(np.diagonal(np.array(self.covariance)))
 
     def curve(self, t_s: Array) -> Array:
-        """F at times since power-up [s], shape of `t_s` [rate]."""
+        """Return F at times since power-up [s], shape of `t_s` [rate]."""
         p1, p2, p3, p4, p5 = self.parameters
         x = np.asarray(t_s, dtype=np.float64) - self.start_s
         return p1 * np.exp(p2 * x) + p3 * np.exp(p4 * x) + p5
 
     def removed(self, cells: Array, cell_s: float) -> Array:
-        """The fitted cells, (n,), minus F(t) − F(t₀) (thesis 3.4), each F the mean over its cell."""
+        """Return the fitted cells, (n,), minus F(t) − F(t₀) (thesis 3.4), each F the mean over its cell."""
         edges = np.arange(len(cells) + 1) * cell_s
         heating = np.zeros(len(cells))
         for p, rate in (self.parameters[0:2], self.parameters[2:4]):

@@ -21,20 +21,20 @@ _STRAIGHT = 1e-2
 
 
 def exponential(x: Array, parameters: Array) -> Array:
-    """Integral of an exponential [s]; parameters [ln τ]."""
+    """Return the integral of an exponential up to x [s]; parameters [ln τ]."""
     tau = np.exp(parameters[0])
     return -tau * np.expm1(-x / tau)
 
 
 def raised_cosine(x: Array, parameters: Array) -> Array:
-    """Integral of a raised cosine [s]; parameters [ln T]."""
+    """Return the integral of a raised cosine up to x [s]; parameters [ln T]."""
     end = np.exp(parameters[0])
     u = np.minimum(x / end, 1.0)
     return 0.5 * end * (u + np.sin(np.pi * u) / np.pi)
 
 
 def straight(x: Array, parameters: Array) -> Array:
-    """Integral of a straight decline [s]; parameters [ln T]."""
+    """Return the integral of a straight decline up to x [s]; parameters [ln T]."""
     end = np.exp(parameters[0])
     u = np.minimum(x / end, 1.0)
     return end * u * (1.0 - 0.5 * u)
@@ -51,11 +51,11 @@ def ended_exponential(x: Array, parameters: Array) -> Array:
 
 
 def cell_means(shape: Shape, edges_s: Array, parameters: Array) -> Array:
-    """Means of a shape between neighbouring edges (n+1,) [s], (n,)."""
+    """Return the means of a shape between neighbouring edges (n+1,) [s], (n,)."""
     return np.diff(shape(edges_s, parameters)) / np.diff(edges_s)
 
 
 def value(shape: Shape, x: Array, parameters: Array) -> Array:
-    """The shape itself at times x ≥ 0 [s], shape of x."""
+    """Return the shape itself at times x ≥ 0 [s], shape of x."""
     h = 1e-4 * np.exp(parameters[0])
     return (shape(x + h, parameters) - shape(x, parameters)) / h

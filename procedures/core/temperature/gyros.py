@@ -29,11 +29,13 @@ class GyroPolynomial:
             raise BadParameter("covariance", np.shape(self.covariance), f"({order}, {order})")
 
     def powers(self, departure_c: Array) -> Array:
-        """Columns that the coefficients multiply, (n, order)."""
+        """Return the columns that the coefficients multiply, (n, order), for departures from the reference (n,)
+        [°C].
+        """
         return departure_c[:, None] ** np.arange(1, len(self.coefficients) + 1)
 
     def rate(self, departure_c: Array) -> Array:
-        """Rate that temperature adds, (n,) [rad/s]."""
+        """Return the rate that temperature adds, (n,) [rad/s], at departures from the reference (n,) [°C]."""
         return self.powers(departure_c) @ np.array(self.coefficients, dtype=np.float64)
 
 
@@ -49,12 +51,14 @@ class GyroThermalCorrection:
     """Taken out of the sensors' readings before the fit, and so wherever it is used; None: readings as they are."""
 
     def apply(self, rates_rad_s: Array, own_c: Array) -> Array:
-        """Rates (n, 3) [rad/s] without what temperature adds, by each gyro's own temperature (n, 3) [°C]."""
+        """Return rates (n, 3) [rad/s] without what temperature adds, by each gyro's own temperature (n, 3) [°C]."""
         added = [g.rate(own_c[:, i] - self.reference_c) for i, g in enumerate(self.gyros)]
         return rates_rad_s - np.column_stack(added)
 
     def covariance(self, axis: int, own_c: Array) -> Array:
-        """Covariance of a gyro's corrected rates at temperatures (n,), (n, n): common to all by the coefficients."""
+        """Return the covariance of a gyro's corrected rates at temperatures (n,), (n, n): common to all by the
+        coefficients.
+        """
         gyro = self.gyros[axis]
         if not gyro.coefficients:
             return np.zeros((len(own_c), len(own_c)))

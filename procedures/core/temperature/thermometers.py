@@ -52,23 +52,27 @@ class ThermometerCorrection:
             )
 
     def has(self, channel: str) -> bool:
-        """Whether a channel's sensor was calibrated."""
+        """Return whether a channel's sensor was calibrated."""
         return any(s.channel == channel for s in self.sensors)
 
     def corrected(self, channel: str, reading_c: ArrayLike) -> Array:
-        """Temperatures of readings of a channel [°C], of their shape. Raises `BadParameter` for an unknown channel."""
+        """Return the temperatures of readings of a channel [°C], of their shape. Raises `BadParameter` for an unknown
+        channel.
+        """
         sensor, reading = self.sensors[self._index(channel)], np.asarray(reading_c, dtype=np.float64)
         return reading - sensor.offset_c - sensor.slope * (reading - self.reference_c)
 
     def uncertainty_c(self, channel: str, reading_c: ArrayLike) -> Array:
-        """Standard uncertainty of the corrected temperatures, of the shape of the readings [°C]."""
+        """Return the standard uncertainty of the corrected temperatures, of the shape of the readings [°C]."""
         own = self.of_pair((channel,))
         away = np.asarray(reading_c, dtype=np.float64) - self.reference_c
         variance = own[0, 0] + 2.0 * away * own[0, 1] + away**2 * own[1, 1]
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)), dtype=np.float64)
 
     def of_pair(self, channels: tuple[str, ...]) -> Array:
-        """Covariance of offset and slope of some channels, in their order, (2k, 2k). Raises `BadParameter`."""
+        """Return the covariance of offset and slope of some channels, in their order, (2k, 2k). Raises
+        `BadParameter`.
+        """
         rows = [i for c in channels for i in (2 * self._index(c), 2 * self._index(c) + 1)]
         return np.array(self.covariance, dtype=np.float64)[np.ix_(rows, rows)]
 

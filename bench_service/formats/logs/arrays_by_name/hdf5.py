@@ -9,7 +9,13 @@ import numpy as np
 
 from bench_service.formats.bounds import MEGABYTE, quoted
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.logs.arrays_by_name.tables import MOST_ARRAYS, NamedArray, tables_by_length
+from bench_service.formats.logs.arrays_by_name.tables import (
+    MOST_ARRAYS,
+    NamedArray,
+    StatedRates,
+    lies,
+    tables_by_length,
+)
 from bench_service.formats.logs.optional import needed
 from bench_service.formats.logs.table import BLOCK_ROWS, LogTable, Numbers
 
@@ -44,7 +50,7 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Hdf5":
-    """Open an HDF5 file. Raises `UnreadableFile`."""
+    """Return a reader of an HDF5 file. Raises `UnreadableFile`."""
     return Hdf5(stream, name)
 
 
@@ -59,13 +65,14 @@ class _Place:
 
 
 class Hdf5:
-    """Reader of an HDF5 file."""
+    """Reader of one HDF5 file, MATLAB 7.3 among them. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name
         self.warnings: list[str] = []
         self._notes: list[str] = []
         self._arrays: dict[str, _Place] = {}
+        self._rates = StatedRates()
         h5py = needed("h5py", name)
         stream.seek(0)
         try:
@@ -76,12 +83,14 @@ class Hdf5:
 
     def _collect(self, h5py: Any) -> None:
         def visit(path: str, item: Any) -> None:
+            self._rates.add_all(f"{path}.", item.attrs)
             if isinstance(item, h5py.Dataset) and len(self._arrays) < MOST_ARRAYS and not path.startswith("#"):
                 self._dataset(path, item)
             elif item.attrs.get("MATLAB_class") in (b"table", b"timetable", b"datetime"):
                 self._note(_TABLES)
 
         self._file.visititems(visit)
+        self._rates.add_all("", self._file.attrs)
 
     def _dataset(self, path: str, item: Any) -> None:
         matlab = item.attrs.get("MATLAB_class")
@@ -94,9 +103,13 @@ class Hdf5:
         if item.dtype.names:
             if len(item.shape) == 1:
                 for field in item.dtype.names:
-                    if item.dtype[field].kind in "iufb" and not item.dtype[field].shape:
-                        self._add(f"{title}.{field}", item, item.shape[0], 1, unit, path, field=field)
+                    part = item.dtype[field]
+                    if part.base.kind in "iufb" and len(part.shape) <= 1:
+                        width = part.shape[0] if part.shape else 1
+                        self._add(f"{title}.{field}", item, item.shape[0], width, unit, path, field=field)
             return
+        if item.dtype.kind in "iuf" and item.size == 1:
+            self._rates.add(path, item[()])
         if item.dtype.kind not in "iufb" or len(item.shape) not in (1, 2):
             return
         shape = item.shape if len(item.shape) == 2 else (item.shape[0], 1)
@@ -104,9 +117,10 @@ class Hdf5:
         rows, width = (shape[1], shape[0]) if turned else shape
         if rows == 1 and width > 1:
             rows, width, turned = width, 1, not turned
+        if lies(rows, width):
+            self._note(f"{quoted(title)} is {rows} x {width}: its columns are taken as the samples")
+            rows, width, turned = width, rows, not turned
         self._add(title, item, rows, width, unit, path, turned=turned)
-        if rows < width and 1 < rows <= 6:
-            self._note(f"{quoted(title)} is {rows} x {width}: samples are expected in rows; transpose it")
 
     def _add(self, title: str, item: Any, rows: int, width: int, unit: str, path: str, **more: Any) -> None:
         if item.chunks is not None and np.prod(item.chunks) * item.dtype.itemsize > LARGEST_CHUNK:
@@ -119,8 +133,8 @@ class Hdf5:
             self._notes.append(words)
 
     def tables(self) -> list[LogTable]:
-        """List the datasets, those of one length as one table. Raises `UnreadableFile` where there is none."""
-        found = tables_by_length([p.array for p in self._arrays.values()], self._notes)
+        """Return the datasets as tables, those of one length as one. Raises `UnreadableFile` where there is none."""
+        found = tables_by_length([p.array for p in self._arrays.values()], self._notes, self._rates)
         if not found:
             raise UnreadableFile(
                 self._name, f"holds no dataset of samples: {'; '.join(self._notes) or 'it has none of numbers'}"
@@ -128,7 +142,7 @@ class Hdf5:
         return found
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield rows of the datasets' columns. Raises `UnreadableFile`."""
+        """Yield blocks of rows: for each named column its values, (n,). Raises `UnreadableFile`."""
         places = {name: (p, i) for p in self._arrays.values() for i, name in enumerate(p.array.columns)}
         wanted = [places[name] for name in columns]
         count = table.rows or 0
@@ -158,7 +172,8 @@ def _part(place: _Place, item: Any, index: int, rows: slice, read: dict[str, Any
             read[place.path] = np.ascontiguousarray(block) if len(block) <= NARROW else block
     data = read[place.path]
     if place.field:
-        return np.ascontiguousarray(data[place.field])
+        values = data[place.field] if data[place.field].ndim == 1 else data[place.field][:, index]
+        return np.ascontiguousarray(values).astype(values.dtype.newbyteorder("="), copy=False)
     column = data if data.ndim == 1 else data[index]
     return np.ascontiguousarray(column).astype(column.dtype.newbyteorder("="), copy=False)
 

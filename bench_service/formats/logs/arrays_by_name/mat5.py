@@ -16,7 +16,13 @@ import numpy as np
 from bench_service.formats.bounds import quoted
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.logs.arrays_by_name.mat5_source import Packed, Plain, Source
-from bench_service.formats.logs.arrays_by_name.tables import MOST_ARRAYS, NamedArray, tables_by_length
+from bench_service.formats.logs.arrays_by_name.tables import (
+    MOST_ARRAYS,
+    NamedArray,
+    StatedRates,
+    lies,
+    tables_by_length,
+)
 from bench_service.formats.logs.bytes_at import exactly, size_of
 from bench_service.formats.logs.table import BLOCK_ROWS, LogTable, Numbers
 
@@ -47,28 +53,30 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Mat5":
-    """Open a MATLAB file. Raises `UnreadableFile`."""
+    """Return a reader of a MATLAB file. Raises `UnreadableFile`."""
     return Mat5(stream, name)
 
 
 @dataclass(frozen=True)
 class _Place:
-    """A numeric array and the place of its numbers. `code`: numpy's type."""
+    """A numeric array and the place of its numbers. `code`: numpy's type; `lying`: samples are its columns."""
 
     array: NamedArray
     source: Source
     at: int
     code: str
+    lying: bool = False
 
 
 class Mat5:
-    """A MATLAB file of level 5."""
+    """Reader of one MATLAB file of level 5. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
         self.warnings: list[str] = []
         self._arrays: dict[str, _Place] = {}
         self._notes: list[str] = []
+        self._rates = StatedRates()
         stream.seek(0)
         head = exactly(stream, 128, name, "the header of a MATLAB file")
         self._order = "<" if head[126:128] == b"IM" else ">"
@@ -166,27 +174,29 @@ class Mat5:
         rows, width = dims
         if rows == 1 and width > 1:  # a row vector is a series, too
             rows, width = width, 1
+        lying = lies(rows, width)
+        if lying:
+            self._note(f"{quoted(title)} is {rows} x {width}: its columns are taken as the samples")
+            rows, width = width, rows
         order = self._order if code[1] != "1" else "|"
-        self._arrays[title] = _Place(NamedArray(title, rows, width), source, data, order + code)
-        if dims[0] < dims[1] and 1 < dims[0] <= 6:
-            self._note(
-                f"{quoted(title)} is {dims[0]} x {dims[1]}: samples are expected in rows; transpose it in MATLAB"
-            )
+        self._arrays[title] = _Place(NamedArray(title, rows, width), source, data, order + code, lying)
+        if rows == width == 1:
+            self._rates.add(title, np.frombuffer(source.read(data, length), order + code)[0])
 
     def _note(self, words: str) -> None:
         if words not in self._notes and len(self._notes) < 20:
             self._notes.append(words)
 
     def tables(self) -> list[LogTable]:
-        """List the arrays, those of one length as one table. Raises `UnreadableFile` where there is none."""
-        found = tables_by_length([p.array for p in self._arrays.values()], self._notes)
+        """Return the arrays as tables, those of one length as one. Raises `UnreadableFile` where there is none."""
+        found = tables_by_length([p.array for p in self._arrays.values()], self._notes, self._rates)
         if not found:
             why = "; ".join(self._notes) or "it holds only single numbers"
             raise UnreadableFile(self._name, f"holds no matrix of samples: {why}")
         return found
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield rows of the arrays' columns. Raises `UnreadableFile`."""
+        """Yield blocks of rows: for each named column its values, (n,). Raises `UnreadableFile`."""
         places = {name: (p, i) for p in self._arrays.values() for i, name in enumerate(p.array.columns)}
         readers = [_Column(*places[name]) for name in columns]
         count = table.rows or 0
@@ -203,9 +213,11 @@ class _Column:
 
     def __init__(self, place: _Place, index: int) -> None:
         self._dtype = np.dtype(place.code)
-        self._walk = place.source.walk(place.at + index * place.array.rows * self._dtype.itemsize)
+        self._step, self._index = (place.array.width, index) if place.lying else (1, 0)
+        begin = 0 if place.lying else index * place.array.rows
+        self._walk = place.source.walk(place.at + begin * self._dtype.itemsize)
 
     def take(self, rows: int) -> Numbers:
         """Return the next rows in the machine's byte order."""
-        data = self._walk.take(rows * self._dtype.itemsize)
-        return np.frombuffer(data, self._dtype).astype(self._dtype.newbyteorder("="))
+        data = self._walk.take(rows * self._step * self._dtype.itemsize)
+        return np.frombuffer(data, self._dtype)[self._index :: self._step].astype(self._dtype.newbyteorder("="))

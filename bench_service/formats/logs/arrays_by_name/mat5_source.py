@@ -7,10 +7,12 @@ _PIECE = 256 * 1024
 WHOLE_BYTES = 16 * 1024 * 1024
 """Size of a variable that is unpacked at once."""
 MOST_MARKS = 16
+_GLANCE = 4096
+"""Number of bytes that are unpacked at once where only the head of a variable is asked for."""
 
 
 class Walk(Protocol):
-    """Bytes from a place on, in order."""
+    """Reader of a variable's bytes in order, from a place on. Interface."""
 
     def take(self, size: int) -> bytes:
         """Return the next bytes. Raises `EOFError` where they end."""
@@ -18,32 +20,32 @@ class Walk(Protocol):
 
 
 class Source(Protocol):
-    """Bytes of one variable."""
+    """Bytes of one variable of a MATLAB file, plain or packed. Interface."""
 
     def read(self, at: int, size: int) -> bytes:
         """Return bytes at a place. Raises `EOFError` where they end."""
         ...
 
     def walk(self, at: int) -> Walk:
-        """Return a walk from a place on."""
+        """Return a reader of the bytes in order, from a place on."""
         ...
 
 
 class Plain:
-    """A variable that is not packed: a part of the file."""
+    """Bytes of a variable that is not packed: a part of the file. Implements `Source`."""
 
     def __init__(self, stream: BinaryIO, begin: int, length: int) -> None:
         self._stream, self._begin, self._length = stream, begin, length
 
     def read(self, at: int, size: int) -> bytes:
-        """Return bytes at a place. Raises `EOFError`."""
+        """Return `size` bytes at a place. Raises `EOFError` where they end."""
         if at + size > self._length:
             raise EOFError("it ends too early")
         self._stream.seek(self._begin + at)
         return self._stream.read(size)
 
     def walk(self, at: int) -> "_PlainWalk":
-        """Return a walk from a place on."""
+        """Return a reader of the bytes in order, from a place on."""
         return _PlainWalk(self, at)
 
 
@@ -58,7 +60,9 @@ class _PlainWalk:
 
 
 class Packed:
-    """A variable packed by zlib. Reading goes forward; a place that lies behind begins again."""
+    """Bytes of a variable packed by zlib. Reading goes forward; a place that lies behind begins again. Implements
+    `Source`.
+    """
 
     def __init__(self, stream: BinaryIO, begin: int, length: int, big_endian: bool) -> None:
         self._stream, self._begin, self._length = stream, begin, length
@@ -68,7 +72,7 @@ class Packed:
         self.unpacked_bytes = 8 + int.from_bytes(self._reading.glance(0, 8)[4:], "big" if big_endian else "little")
 
     def read(self, at: int, size: int) -> bytes:
-        """Return bytes at a place. Raises `EOFError`, `zlib.error`."""
+        """Return `size` unpacked bytes at a place. Raises `EOFError`, `zlib.error`."""
         if at < self._reading.at:
             self._reading = _PackedWalk(self._stream, self._begin, self._length)
         if size <= 4096:
@@ -120,7 +124,7 @@ class _PackedWalk:
         other._unpacker, other._have, other.at = self._unpacker.copy(), self._have, self.at
         return other
 
-    def _fill(self, size: int) -> None:
+    def _fill(self, size: int, at_once: int = 4 * _PIECE) -> None:
         parts, have = [self._have], len(self._have)
         while have < size:
             data = self._unpacker.unconsumed_tail
@@ -128,7 +132,7 @@ class _PackedWalk:
                 self._stream.seek(self._next)
                 data = self._stream.read(min(_PIECE, self._end - self._next))
                 self._next += len(data)
-            part = self._unpacker.decompress(data, 4 * _PIECE)
+            part = self._unpacker.decompress(data, at_once)
             if not part and (self._unpacker.eof or not data):
                 break
             parts.append(part)
@@ -144,7 +148,7 @@ class _PackedWalk:
     def glance(self, at: int, size: int) -> bytes:
         """Return bytes at a place without taking those after it. Raises `EOFError`."""
         self.skip_to(at)
-        self._fill(size)
+        self._fill(size, _GLANCE)
         if len(self._have) < size:
             raise EOFError("it ends too early")
         return self._have[:size]

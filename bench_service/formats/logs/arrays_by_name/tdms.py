@@ -5,9 +5,10 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from bench_service.formats.bounds import MEGABYTE, quoted
+from bench_service.formats.bounds import MEGABYTE
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.logs.names import hint, is_time, unit_of
+from bench_service.formats.logs.arrays_by_name.tables import with_unit
+from bench_service.formats.logs.names import hint, is_time
 from bench_service.formats.logs.optional import needed
 from bench_service.formats.logs.table import LogClock, LogColumn, LogTable, Numbers
 
@@ -25,12 +26,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Tdms":
-    """Open a TDMS file. Raises `UnreadableFile`."""
+    """Return a reader of a TDMS file. Raises `UnreadableFile`."""
     return Tdms(stream, name)
 
 
 class Tdms:
-    """A TDMS file: its metadata in memory, its data in chunks."""
+    """Reader of one TDMS file: its metadata in memory, its data in chunks. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name
@@ -47,7 +48,9 @@ class Tdms:
             self.warnings.append("the last segment of the file is cut off: what is before it was read")
 
     def tables(self) -> list[LogTable]:
-        """List the groups; channels of one length in a group are one table."""
+        """Return the groups as tables; channels of one length in a group are one table. Raises `UnreadableFile` where
+        there is none.
+        """
         found: list[LogTable] = []
         for group, channels in self._groups.items():
             lengths = sorted({len(c) for c in channels.values() if len(c) > 1}, reverse=True)
@@ -85,7 +88,7 @@ class Tdms:
         return LogTable(title, tuple(columns), tuple(clocks), rate, rows, tuple(notes))
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the channels' values chunk by chunk. Raises `UnreadableFile`."""
+        """Yield blocks of rows, chunk by chunk: for each named column its values, (n,). Raises `UnreadableFile`."""
         group = table.name if table.name in self._groups else table.name.rpartition(", ")[0]
         waiting: dict[str, list[Numbers]] = {name: [] for name in columns if name != SAMPLE_TIME}
         done = 0
@@ -133,9 +136,9 @@ def _column(name: str, channel: Any) -> LogColumn:
     said = str(channel.properties.get("unit_string", ""))
     if guess.quantity is None:
         return LogColumn(name)
-    unit = unit_of(said, guess.quantity) if said else None
-    source = f"unit_string of the channel, {quoted(said)}" if unit else "the name of the channel"
-    return LogColumn(name, guess.quantity, unit or guess.unit, channel=guess.channel, source=source, doubt=guess.doubt)
+    return with_unit(
+        LogColumn(name, guess.quantity, guess.unit, channel=guess.channel, doubt=guess.doubt), said, "channel"
+    )
 
 
 def _words(error: Exception) -> str:

@@ -19,13 +19,13 @@ class Batches:
         self._clear()
 
     def _clear(self) -> None:
-        self._messages: list[bytes | memoryview] = []
+        self._messages: list[bytes] = []
         self._times: list[int] = []
         self._bytes = 0
 
     def add(self, data: bytes | memoryview, received_ns: int, published_ns: int = 0) -> Iterator[list[Numbers]]:
-        """Take a message in; yield blocks of columns when there are enough."""
-        self._messages.append(data)
+        """Add a message; yield blocks of columns once there are enough messages to decode."""
+        self._messages.append(bytes(data))  # a view would keep its whole chunk, with the images that are in it
         self._times.append(received_ns)
         self._times.append(published_ns)
         self._bytes += len(data)
@@ -33,7 +33,7 @@ class Batches:
             yield from self.rest()
 
     def rest(self) -> Iterator[list[Numbers]]:
-        """Yield blocks of columns of all messages that were gathered."""
+        """Yield blocks of columns of all messages that were gathered and not decoded yet."""
         if not self._messages:
             return
         messages, times = self._messages, np.array(self._times, np.uint64).astype(np.int64).reshape(-1, 2)

@@ -10,7 +10,7 @@ MOST_TEXT = 200_000
 
 
 def parsed(text: str, type_name: str, encoding: str, file: str) -> Types | None:
-    """Parse a definition with those it includes; None: it cannot be parsed."""
+    """Return the types of a message definition with those it includes; None: it cannot be parsed."""
     typesys = needed("rosbags.typesys", file)
     if len(text) > MOST_TEXT:
         return None

@@ -33,12 +33,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Mcap":
-    """Open an MCAP. Raises `UnreadableFile`."""
+    """Return a reader of an MCAP file. Raises `UnreadableFile`."""
     return Mcap(stream, name)
 
 
 class Mcap:
-    """An MCAP, read record by record."""
+    """Reader of one MCAP file with ROS messages, record by record. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -212,11 +212,11 @@ class Mcap:
         return found
 
     def tables(self) -> list[LogTable]:
-        """List the topics as tables."""
+        """Return the topics that have messages as tables."""
         return [topic.table() for topic in self._channels.values() if topic.rows != 0]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the messages of a topic as columns. Raises `UnreadableFile`."""
+        """Yield blocks of a topic's messages: for each named column its values, (n,). Raises `UnreadableFile`."""
         wanted = frozenset(number for number, topic in self._channels.items() if topic.name == table.name)
         if not wanted:
             return

@@ -55,7 +55,7 @@ class Layout:
 
 
 class Undecodable(Exception):
-    """A message does not fit its definition."""
+    """Raised where a message does not fit its definition."""
 
 
 class _Walk:
@@ -142,7 +142,7 @@ class _Walk:
 
 
 def lay_out(types: Types, type_name: str, data: bytes, cdr: bool) -> Layout:
-    """Find the places of all numbers in a message. Raises `Undecodable`."""
+    """Return the places of all numbers in a message of a type. Raises `Undecodable`."""
     walk = _Walk(types, data, cdr)
     walk.walk(type_name)
     walk.layout.size = walk.at
@@ -151,7 +151,7 @@ def lay_out(types: Types, type_name: str, data: bytes, cdr: bool) -> Layout:
 
 @dataclass
 class Topic:
-    """A topic: its type, definitions, how often it comes, and a first message."""
+    """A topic of a bag: its name and type, its definitions, its number of messages, and a first message."""
 
     name: str
     type_name: str
@@ -165,7 +165,7 @@ class Topic:
     """Whether messages have a time of publication in addition to that of arrival."""
 
     def table(self) -> LogTable:
-        """Describe the topic as a table."""
+        """Return the topic's description as a table, with its columns and clocks."""
         received = LogClock(LOG_TIME, 1e-9, "the recorder's clock at the arrival of the message")
         clocks = [received]
         if self.publish:
@@ -218,7 +218,7 @@ class Topic:
 
 
 class Decoder:
-    """Turns messages of one topic into columns, as many at a time as there are."""
+    """Decodes messages of one topic into columns, as many at a time as are given."""
 
     def __init__(self, topic: Topic, columns: Sequence[str], file: str) -> None:
         self._topic, self._columns, self._file = topic, columns, file
@@ -228,7 +228,7 @@ class Decoder:
     def decode(
         self, messages: Sequence[bytes | memoryview], received: Numbers, published: Numbers
     ) -> Iterator[list[Numbers]]:
-        """Yield blocks of columns, messages of one length together and in order. Raises `UnreadableFile`."""
+        """Yield blocks of columns, (n,) each, messages of one length together and in order. Raises `UnreadableFile`."""
         at = 0
         for size, group in groupby(messages, len):
             part = list(group)

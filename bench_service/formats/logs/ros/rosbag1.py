@@ -32,12 +32,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Bag":
-    """Open a ROS 1 bag. Raises `UnreadableFile`."""
+    """Return a reader of a ROS 1 bag. Raises `UnreadableFile`."""
     return Bag(stream, name)
 
 
 class Bag:
-    """A ROS 1 bag, read record by record."""
+    """Reader of one ROS 1 bag, record by record. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -206,7 +206,7 @@ class Bag:
         self._topics[number] = found
 
     def tables(self) -> list[LogTable]:
-        """List the topics; connections of one topic are one table."""
+        """Return the topics as tables; connections of one topic are one table."""
         found: dict[str, Topic] = {}
         for topic in self._topics.values():
             if topic.rows == 0:
@@ -218,7 +218,7 @@ class Bag:
         return [topic.table() for topic in found.values()]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the messages of a topic as columns. Raises `UnreadableFile`."""
+        """Yield blocks of a topic's messages: for each named column its values, (n,). Raises `UnreadableFile`."""
         wanted = frozenset(number for number, topic in self._topics.items() if topic.name == table.name)
         if not wanted:
             return

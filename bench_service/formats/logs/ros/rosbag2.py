@@ -14,6 +14,7 @@ from bench_service.formats.logs.ros.batches import Batches
 from bench_service.formats.logs.ros.definitions import distribution, full_name, parsed
 from bench_service.formats.logs.ros.messages import Decoder, Topic
 from bench_service.formats.logs.ros.sqlite_stream import connected
+from bench_service.formats.logs.ros.unpacked import ZSTD, unpacked_stream
 from bench_service.formats.logs.table import LogTable, Numbers
 
 NAME = "rosbag2"
@@ -27,12 +28,12 @@ def begins(start: bytes) -> bool:
 
 
 def opened(stream: BinaryIO, name: str) -> "Database":
-    """Open a ROS 2 bag. Raises `UnreadableFile`."""
+    """Return a reader of a ROS 2 bag in SQLite. Raises `UnreadableFile`."""
     return Database(stream, name)
 
 
 class Database:
-    """A bag in SQLite; one file of it, where it was split."""
+    """Reader of one ROS 2 bag in SQLite; of one file of it, where it was split. Implements `Log`."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name
@@ -72,22 +73,28 @@ class Database:
         if found.type_name not in found.types:
             found.problem = f"the bag has no definition of {quoted(title)}, and it is none of the common types"
         first = next(self._ask("SELECT data FROM messages WHERE topic_id = ? LIMIT 1", [number]), None)
-        found.first = None if first is None else bytes(first[0])
+        found.first = None if first is None else self._plain(first[0])
         count = next(self._ask("SELECT count(*) FROM messages WHERE topic_id = ?", [number]))
         found.rows = int(count[0])
         return found
 
+    def _plain(self, data: bytes) -> bytes:
+        """Return a message, unpacked where the bag was recorded with compression_mode message."""
+        return unpacked_stream(data, self._name) if data[:4] == ZSTD else bytes(data)
+
     def tables(self) -> list[LogTable]:
-        """List the topics as tables."""
+        """Return the topics that have messages as tables."""
         return [topic.table() for topic in self._topics.values() if topic.rows]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
-        """Yield the messages of a topic as columns, in the order of arrival. Raises `UnreadableFile`."""
+        """Yield blocks of a topic's messages in the order of arrival: for each named column its values, (n,). Raises
+        `UnreadableFile`.
+        """
         number = next((n for n, topic in self._topics.items() if topic.name == table.name), None)
         if number is None:
             return
         batches = Batches(Decoder(self._topics[number], columns, self._name))
         query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY id"
         for received, data in self._ask(query, [number]):
-            yield from batches.add(data, received)
+            yield from batches.add(self._plain(data), received)
         yield from batches.rest()

@@ -12,7 +12,7 @@ _NUMBERS = itertools.count()
 
 
 def connected(stream: BinaryIO, name: str) -> tuple[Any, Any]:
-    """Open a database that is in a stream, read-only; returns it and its file system, which must live as long.
+    """Open a database that is in a stream, read-only; return it and its file system, which must live as long.
 
     Raises `UnreadableFile`.
     """

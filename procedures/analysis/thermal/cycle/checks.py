@@ -63,7 +63,9 @@ def cycle_checks(cycle: ThermalCycle, limits: CycleLimits, *, correct_gyros: boo
 
 
 def planned_cycle_checks(limits: CycleLimits) -> tuple[PlannedCheck, ...]:
-    """Checks that a cycle will have. Its uncertainties rest on the temperatures to come and are not predicted."""
+    """Return the checks that a cycle will have. Its uncertainties rest on the temperatures to come and are not
+    predicted.
+    """
     force = Limit("m/s^2", maximum=limits.three_sigma_m_s2, source=THESIS)
     rms = Limit("m/s^2", maximum=limits.magnitude_rms_m_s2, source=THESIS)
     level = limits.level / len(AXES)

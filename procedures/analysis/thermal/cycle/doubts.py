@@ -19,7 +19,7 @@ REFERENCE_WITHIN_C = 8.0
 def doubts(
     runs: Sequence[RunFound], soaked: Sequence[RunSoaks], axes: Sequence[AxisFound], settings: CycleSettings
 ) -> list[str]:
-    """Warnings that limit the confidence in the numbers of a cycle."""
+    """Return warnings that limit the confidence in the numbers of a cycle."""
     warnings: list[str] = []
     for run, soak in zip(runs, soaked, strict=True):
         warnings += _of_regimes(run, settings.regime.delay_s)

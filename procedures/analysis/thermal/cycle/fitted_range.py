@@ -9,13 +9,13 @@ from procedures.core.thermal_correction import EXTRAPOLATED_C, TemperatureRange,
 
 
 def range_of(cells: Sequence[ThermalRun]) -> TemperatureRange:
-    """Temperature range that the fit's cells cover."""
+    """Return the temperature range that the fit's cells cover."""
     case, board = (np.concatenate([getattr(c, name) for c in cells]) for name in ("case_c", "converter_c"))
     return TemperatureRange((float(case.min()), float(case.max())), (float(board.min()), float(board.max())))
 
 
 def extrapolated(cells: Sequence[ThermalRun], judged: ThermalCorrection) -> list[str]:
-    """Warning where the judged correction was not fitted at the cycle's temperatures."""
+    """Return a warning where the judged correction was not fitted at the cycle's temperatures."""
     if judged.fitted_range is None:
         return ["the judged correction does not say at which temperatures it was fitted: it may be extrapolated"]
     beyond = max(float(judged.fitted_range.beyond_c(c.case_c, c.converter_c).max()) for c in cells)

@@ -31,7 +31,7 @@ class RunSoaks:
 
 
 def soaks_of(run: PreparedRun, reference_c: float) -> RunSoaks:
-    """Find the soaks of a run and its reference soak. Raises `UnfitRecording` where it has no soak at all."""
+    """Return the soaks of a run and its reference soak. Raises `UnfitRecording` where it has no soak at all."""
     found = soaks(run.cells)
     if not found:
         raise UnfitRecording(
@@ -51,7 +51,7 @@ def _leg_at(legs: Sequence[LegEvidence], t_s: float) -> int:
 
 
 def soak_table(runs: Sequence[PreparedRun], found: Sequence[RunSoaks], correction: Corrects) -> tuple[SoakFound, ...]:
-    """3σ at the soaks of every leg, root mean square over the runs."""
+    """Return 3σ at the soaks of every leg, root mean square over the runs."""
     legs = sorted({leg for soaked in found for leg in soaked.of_leg})
     answers: list[SoakFound] = []
     for leg in legs:
@@ -80,7 +80,7 @@ def _over_runs(figures: Sequence[ThreeSigma], name: str) -> tuple[float, float, 
 def worth(
     name: str, runs: Sequence[PreparedRun], found: Sequence[RunSoaks], correction: Corrects, gravity_m_s2: float
 ) -> FormFound:
-    """The worst 3σ and |ĝ| of all runs."""
+    """Return the performance of a correction on all runs: the worst 3σ, and |ĝ|."""
     x, y, z = np.max([s.after_m_s2 for s in soak_table(runs, found, correction)], axis=0).tolist()
     g = [magnitude(run.cells, correction, gravity_m_s2) for run in runs]
     still, moving = (
@@ -104,7 +104,9 @@ class NormalisedTriad:
         return np.array([1.0 / gain.at_reference for gain in self.gains])
 
     def apply(self, output_m_s2: Array, case_c: Array, converter_c: Array, dynamic: ArrayLike) -> Array:
-        """``f = (V − V0 − Fs(t))/(K·Fc(t))`` at case temperatures (n,), or (n, 3) by axis; nothing else is asked."""
+        """Return ``f = (V − V0 − Fs(t))/(K·Fc(t))`` at case temperatures (n,), or (n, 3) by axis; other arguments are
+        not used.
+        """
         own = case_c if case_c.ndim == 2 else np.repeat(case_c[:, None], 3, axis=1)
         columns = [
             (output_m_s2[:, axis] - zero.value(own[:, axis])) / gain.value(own[:, axis])

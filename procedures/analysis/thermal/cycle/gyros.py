@@ -22,14 +22,14 @@ SMALLEST_P = 1e-300
 
 
 def in_cells(values: Array, sample_s: float, cell_s: float) -> Array:
-    """Means (n,) of whole cells of a series of one interval."""
+    """Return the means (n,) of whole cells of a series of one interval."""
     size = round(cell_s / sample_s)
     count = len(values) // size
     return values[: count * size].reshape(count, size).mean(axis=1)
 
 
 def found(run: str, axis: str, c: Correlation) -> CorrelationFound:
-    """Convert a correlation to a value of the result."""
+    """Return a correlation as a value of the result."""
     return CorrelationFound(run, axis, c.r, c.effective_samples, c.slope, c.slope_sd, c.p_value)
 
 
@@ -70,7 +70,9 @@ def gyro_temperatures(
 def gyro_noises(
     runs: Sequence[PreparedRun], settings: CycleSettings, known: Sequence[NoiseCoefficients] | None
 ) -> tuple[GyroNoise, ...]:
-    """Q, N, B of each gyro in each run by the likelihood of its second means' spectrum. Raises `UnfitRecording`."""
+    """Return Q, N, B of each gyro in each run by the likelihood of its second means' spectrum. Raises
+    `UnfitRecording`.
+    """
     answers: list[GyroNoise] = []
     for axis, name in enumerate(AXES):
         beside = None if known is None else _three(known[axis])

@@ -87,9 +87,8 @@ class PreparedRun:
 def prepare(
     series: CycleSeries, settings: CycleSettings, gravity_m_s2: float, converter: ConverterTriad | None
 ) -> PreparedRun:
-    """A run ready to be fitted, with gravity along the axis that is up as its force.
-
-    Raises `BadParameter`, `UnfitRecording`.
+    """Return a run ready to be fitted, with gravity along the axis that is up as its force. Raises `BadParameter`,
+    `UnfitRecording`.
     """
     lags = settings.lag_s
     own = series.sensors_c[:, GYRO_SENSORS]
@@ -116,7 +115,9 @@ def prepare(
 def with_forces(
     runs: Sequence[PreparedRun], settings: CycleSettings, calibration: TriadCalibration
 ) -> tuple[list[PreparedRun], list[str]]:
-    """The runs with the force that each accelerometer felt by the unit's calibration (`felt_forces`), and warnings."""
+    """Return the runs with the force that each accelerometer felt by the unit's calibration (`felt_forces`), and
+    warnings.
+    """
     cells = felt_forces([r.cells for r in runs], settings.reference_c, calibration)
     runs = [_with_force(run, np.array(cell.force_m_s2)) for run, cell in zip(runs, cells, strict=True)]
     warnings: list[str] = []

@@ -23,7 +23,7 @@ CASE_LIKE_SD_S = 1.0
 
 
 def as_temperatures(series: CycleSeries, thermometers: ThermometerCorrection | None) -> CycleSeries:
-    """The series with its sensors corrected; those that were not calibrated as they read."""
+    """Return the series with its sensors corrected; those that were not calibrated as they read."""
     if thermometers is None:
         return series
     columns = [
@@ -112,7 +112,7 @@ def _axis(axis: AxisCorrection, static: str, thermometers: ThermometerCorrection
 def thermometers_at(
     thermometers: ThermometerCorrection, channels: tuple[str, str], references_c: tuple[float, float]
 ) -> Array:
-    """Covariance of offset and slope of two sensors, each about a reference of its own, (4, 4)."""
+    """Return the covariance of offset and slope of two sensors, each about a reference of its own, (4, 4)."""
     turn = np.eye(4)
     for k, reference in enumerate(references_c):
         turn[2 * k, 2 * k + 1] = reference - thermometers.reference_c

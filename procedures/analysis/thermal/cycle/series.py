@@ -109,7 +109,7 @@ def read_cycle(recording: Recording, up: int) -> CycleSeries:
 
 
 def run_of(run: tuple[Recording, int]) -> tuple[str, CycleSeries]:
-    """The recording's id, and `read_cycle` of recording and axis."""
+    """Return the recording's id, and `read_cycle` of recording and axis."""
     return run[0].info.id, read_cycle(*run)
 
 

@@ -1,4 +1,6 @@
-"""Series of a run for figures, what the regime indicator made of its ramps, and Allan deviations before and after."""
+"""Series of a run for figures, the regimes that the indicator found on its ramps, and Allan deviations before and
+after.
+"""
 
 from collections.abc import Sequence
 from math import ceil
@@ -24,7 +26,7 @@ POINTS_PER_DECADE = 5
 
 
 def trace(run: PreparedRun, judged: Corrects, plain: Corrects, reference: Soak, gravity_m_s2: float) -> Trace:
-    """Trace of a run in at most `MOST_POINTS`; `plain` is the correction without its temperature terms."""
+    """Return the trace of a run in at most `MOST_POINTS`; `plain` is the correction without its temperature terms."""
     series = run.series
     before = run.output_m_s2 * judged.scales
     after = judged.apply(run.output_m_s2, run.case_c, run.converter_c, run.dynamic)
@@ -55,7 +57,7 @@ def trace(run: PreparedRun, judged: Corrects, plain: Corrects, reference: Soak, 
 
 
 def leg_regimes(run: PreparedRun, delay_s: float) -> tuple[LegRegime, ...]:
-    """Regime switching of each leg; `delay_s` is the allowed delay of the indicator."""
+    """Return the regime switching of each leg; `delay_s` is the allowed delay of the indicator."""
     return tuple(_leg_regime(run, leg, delay_s) for leg in run.series.legs)
 
 
@@ -84,7 +86,7 @@ def _leg_regime(run: PreparedRun, leg: LegEvidence, delay_s: float) -> LegRegime
 
 
 def allan_of(run: PreparedRun, judged: Corrects) -> tuple[AllanFound, ...]:
-    """Overlapping Allan deviations of outputs and of corrected forces over the whole run (thesis fig. 4.15)."""
+    """Return overlapping Allan deviations of outputs and of corrected forces over the whole run (thesis fig. 4.15)."""
     before = run.output_m_s2 * judged.scales
     after = judged.apply(run.output_m_s2, run.case_c, run.converter_c, run.dynamic)
     rate_hz = 1.0 / run.series.sample_s
