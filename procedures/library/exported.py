@@ -30,7 +30,7 @@ class ExportedCalibration:
     def correct(self, outputs: Samples) -> Array:
         """``v̂ = K⁻¹(U − b)`` of nominal outputs (n, 3) or (3,) in `triad.output_unit`. Raises `BadParameter`."""
         one = np.ndim(outputs) == 1
-        corrected = correct(vectors("outputs", [outputs] if one else outputs), self.triad)
+        corrected = correct(vectors("outputs", np.asarray([outputs]) if one else outputs), self.triad)
         return corrected[0] if one else corrected
 
     def __str__(self) -> str:
