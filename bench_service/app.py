@@ -80,7 +80,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
-    roads = _roads(settings, opened, closing)
+    stop_routes = _stop_routes(settings, opened, closing)
     processes = _work_apart(settings, code, closing) if apart else None
     service = BenchService(
         stores,
@@ -92,7 +92,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         live=board,
         free_bytes=opened.free_bytes,
         traces=traces,
-        roads=roads,
+        stop_routes=stop_routes,
         rescued=rescued,
         processes=processes,
         database=DatabaseContents(opened),
@@ -109,7 +109,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     return service
 
 
-def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
+def _stop_routes(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
     """The ways of a stop to the benches of this host and of others."""
     addresses = StopAddresses(SqlStopAddresses(opened).all, settings.stop_secret_in())
     addresses.begin()

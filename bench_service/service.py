@@ -61,7 +61,7 @@ class BenchService:
         live: LiveBoard | None = None,
         free_bytes: Callable[[], int | None] = lambda: None,
         traces: Traces | None = None,
-        roads: StopRoads | None = None,
+        stop_routes: StopRoads | None = None,
         rescued: Rescue | None = None,
         processes: WorkApart | None = None,
         database: DatabasePort | None = None,
@@ -71,11 +71,11 @@ class BenchService:
     ) -> None:
         """Set up with `driver` of this process's own bench; None: it plans and queues for benches that workers drive.
 
-        `free_bytes`: room on the database's disk, where that is known. `roads`: the ways of a stop to its bench; None:
-        through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
-        analyses are computed and reports typeset; None: in the caller's thread. `database`: the database as a whole;
-        None: not known. `settings`: the time of the nightly work, and the rules for raw data; None: no such work, and
-        no rules. `runner`: builds the runner of batches of analyses; None: other processes run their tasks.
+        `free_bytes`: room on the database's disk, where that is known. `stop_routes`: routes by which a stop reaches
+        its bench; None: through the database alone. `rescued`: the result of making devices safe at start. `processes`:
+        where analyses are computed and reports typeset; None: in the caller's thread. `database`: the database as a
+        whole; None: not known. `settings`: the time of the nightly work, and the rules for raw data; None: no such
+        work, and no rules. `runner`: builds the runner of batches of analyses; None: other processes run their tasks.
         `synthetic`: the source of synthetic recordings; None: they are refused.
         """
         self.access = AccessService(stores.access, AccessBook(stores.access))
@@ -102,8 +102,8 @@ class BenchService:
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
         self.manual = ManualService(stores, planner.benches, self.queues, self._wake)
         self._presence = Presence(stores.manual)
-        self._roads = roads or StopRoads(None)
-        self.stops = StopService(stores, planner.benches, safety, self._wake, self._roads, stores.audit)
+        self._stop_routes = stop_routes or StopRoads(None)
+        self.stops = StopService(stores, planner.benches, safety, self._wake, self._stop_routes, stores.audit)
         self.campaigns = CampaignService(stores, planner, self.analyses, self.jobs.submit, self.jobs.cancel)
         self._driver = driver
         self._worker = worker
@@ -200,7 +200,7 @@ class BenchService:
             if self._worker is not None:
                 self._worker.wake()
         else:
-            self._roads.wake(bench_id)
+            self._stop_routes.wake(bench_id)
 
 
 def _estimates(stores: Stores, job_id: str) -> str:

@@ -28,7 +28,7 @@ def _records(context: Context) -> tuple[TriadRecord | None, TriadRecord | None]:
 
 
 class SiteParameters(JudgedParameters):
-    """Overrides of the bench's site."""
+    """Parameters that override the bench's site; None takes what the bench declares."""
 
     latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
     gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9)
@@ -52,7 +52,7 @@ class SiteParameters(JudgedParameters):
 
 
 class TableParameters(SiteParameters):
-    """The site, and the table's accuracy."""
+    """Parameters that override the bench's site and its table's accuracy; None takes what the bench declares."""
 
     orthogonality_sd_arcsec: Arcsec | None = Field(
         None, description="standard uncertainty of each of the table's two right angles"

@@ -7,7 +7,7 @@ from bench_service.access.roles import RANK, Right, Role, has
 
 
 class Proof(StrEnum):
-    """How a request proves its name."""
+    """Way in which a request proves its name: none, owner of the files, session, token, or trusted proxy."""
 
     NONE = "none"
     """No proof: the single user of a service without accounts, on its own host."""

@@ -37,7 +37,7 @@ class BenchDirectory:
         self._holder = holder
 
     def ids(self) -> tuple[str, ...]:
-        """Ids of all registered benches, in the registry's order. Raises `StorageFailure`."""
+        """Return the ids of all registered benches, in alphabetical order. Raises `StorageFailure`."""
         return tuple(bench.id for bench in self._registry.benches())
 
     def description(self, bench_id: str) -> BenchDescription:

@@ -35,7 +35,7 @@ class PaceLog:
         self._last.append(lag_s)
 
     def measured(self) -> MeasuredPace | None:
-        """Pace of the whole recording; None where its blocks are too few."""
+        """Return the pace of the whole recording; None where its blocks are too few."""
         if self._blocks < LEAST:
             return None
         half = min(ENDS, self._blocks // 2)

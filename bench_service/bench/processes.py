@@ -77,7 +77,7 @@ class Watch(Protocol):
         ...
 
     def supervisor(self) -> ProcessIdentity | None:
-        """The process that supervises the bench on this host, if one is alive."""
+        """Return the process that supervises the bench on this host, if one is alive; else None."""
         ...
 
 

@@ -118,7 +118,7 @@ def smallest_step(planned: PlannedCheck, power: float, of: int) -> float:
 
 
 def half_width(limit: Limit) -> float:
-    """Half of the allowed range; of a limit on one side its size."""
+    """Return half of the allowed range; of a limit on one side its size."""
     if limit.maximum is not None and limit.minimum is not None:
         return 0.5 * (limit.maximum - limit.minimum)
     return abs(limit.maximum if limit.maximum is not None else limit.minimum or 0.0)

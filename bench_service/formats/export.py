@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from bench_service.formats.chunk import RAW_BYTES, arrow_array, sample_type
-from bench_service.formats.outbox import Outbox
+from bench_service.formats.samples_out.written_bytes import WrittenBytes
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
 
@@ -162,7 +162,7 @@ def _batches(schema: Any, blocks: Iterable[RawArray]) -> Iterator[Any]:
 def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
     import pyarrow as pa
 
-    outbox, schema = Outbox(), _schema(part)
+    outbox, schema = WrittenBytes(), _schema(part)
     with pa.ipc.new_stream(pa.PythonFile(outbox, mode="w"), schema) as writer:
         for batch in _batches(schema, blocks):
             writer.write_batch(batch)
@@ -174,7 +174,7 @@ def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    outbox, schema = Outbox(), _schema(part)
+    outbox, schema = WrittenBytes(), _schema(part)
     with pq.ParquetWriter(
         pa.PythonFile(outbox, mode="w"),
         schema,

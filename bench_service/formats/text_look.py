@@ -21,7 +21,7 @@ _MISSING = (b"", b"nan", b"na", b"null", b"none")
 
 @dataclass(frozen=True)
 class TextLook:
-    """Findings about the beginning of a text."""
+    """Form of a delimited text by its beginning: delimiter, decimal mark, lines before the data, names, width."""
 
     delimiter: str
     decimal: str

@@ -21,7 +21,7 @@ LONGEST = timedelta(days=90)
 
 @dataclass(frozen=True)
 class ReservationRequest:
-    """A client's request for a reservation."""
+    """A client's request for a reservation: what, for whom, until when."""
 
     kind: Reserved
     name: str
@@ -95,7 +95,7 @@ class QueueService:
             return ""
 
     def team_of_bench(self, bench_id: str) -> str:
-        """The team that has reserved a bench now; empty: none has."""
+        """Return the team that has reserved a bench now; empty: none has."""
         held = self._stores.queue.look(bench_id, now()).reservations
         return next((r.team for r in held if (r.kind, r.name) == (Reserved.BENCH, bench_id)), "")
 

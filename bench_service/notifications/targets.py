@@ -59,7 +59,7 @@ class Targets(BaseModel):
 
 
 def read_targets(file: Path) -> Targets:
-    """Read and check the file of `BENCH_NOTIFY`. Raises `Misconfigured` naming the field."""
+    """Return the targets that the file of `BENCH_NOTIFY` lists, checked. Raises `Misconfigured` naming the field."""
     try:
         found = Targets.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -19,7 +19,9 @@ __all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "lease_
 
 
 def open_stores(database_url: str, copies: "Path | None" = None) -> "tuple[Stores, Database]":
-    """Open all stores behind a URL, in the newest form; see `bench_service.persistence.stores.open_stores`."""
+    """Open and return all stores behind a URL, in the newest form; see
+    `bench_service.persistence.stores.open_stores`.
+    """
     from bench_service.persistence.stores import open_stores as opened
 
     return opened(database_url, copies)

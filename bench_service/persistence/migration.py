@@ -73,7 +73,7 @@ def _check_known(revision: str | None) -> None:
 
 
 def revision_of(connection: Connection) -> str | None:
-    """Read the revision of the database; None for an empty one."""
+    """Return the revision of the database; None for an empty one."""
     if not inspect(connection).has_table("alembic_version"):
         return None
     return connection.scalar(text("SELECT version_num FROM alembic_version"))

@@ -28,7 +28,7 @@ class FieldError(View):
 
 
 class Problem(View):
-    """Problem document of RFC 9457."""
+    """Problem document of a refusal (RFC 9457): status, kind, sentence, faulty fields."""
 
     status: int
     title: str = ""
@@ -39,7 +39,7 @@ class Problem(View):
 
 
 class Failure(View):
-    """Reason for which a job failed."""
+    """Reason for which a job failed: a short kind, and a sentence for a person."""
 
     kind: str
     message: str
@@ -128,7 +128,7 @@ class Uncertainty(View):
 
 
 class Preview(View):
-    """Preview of a plan before anything moves."""
+    """Preview of a plan before anything moves: stations, duration, uncertainties, warnings, violations."""
 
     procedure: str
     unit: str

@@ -31,7 +31,7 @@ _TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class CosineSeries:
-    """A series with its cosine coefficients."""
+    """A series of cell means with its cosine coefficients and their variances per unit of each noise process."""
 
     values: Array
     """Means over the grouped cells, (n,) [rate]; cells at the end that fill no group are left out."""

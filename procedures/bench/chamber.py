@@ -9,7 +9,7 @@ from procedures.core.errors import BadParameter
 
 @dataclass(frozen=True)
 class ChamberLimits:
-    """Limits of the chamber's temperature and ramp."""
+    """Limits of demands of the chamber: temperature, ramp; and its ambient temperature."""
 
     minimum_c: float
     maximum_c: float

@@ -22,7 +22,7 @@ class CurrentSourceLimits:
 
 @dataclass(frozen=True)
 class CurrentSourceReading:
-    """State of the source at one moment."""
+    """State of the current source at one moment: setting and status words."""
 
     time_s: float
     """Bench time of the reading [s]; its age is the clock's time less this."""

@@ -44,5 +44,5 @@ class Device(Protocol):
     """
 
     async def identify(self) -> DeviceIdentity:
-        """Ask the device for its maker, model, serial and firmware. Raises `Disconnected`."""
+        """Ask the device for its maker, model, serial and firmware, and return them. Raises `Disconnected`."""
         ...

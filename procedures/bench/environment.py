@@ -19,7 +19,7 @@ class EnvironmentReading:
 
 
 class Environment(Device, Protocol):
-    """Conditions of the room around the bench."""
+    """Sensor of the room around the bench: temperature, humidity, pressure. Interface."""
 
     async def read(self) -> EnvironmentReading:
         """Return the room's temperature, humidity and pressure; None for what is not measured. Raises

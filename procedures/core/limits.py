@@ -21,7 +21,7 @@ COVERAGE = 0.9545
 
 @dataclass(frozen=True)
 class Rule:
-    """Decision rule of one limit."""
+    """Decision rule of one limit: simple or guarded acceptance, guard band, coverage."""
 
     name: RuleName = "simple"
     guard: float = 1.0
@@ -36,7 +36,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Decision:
-    """How one value was decided."""
+    """How one value was decided: rule, outcome, expanded uncertainty, guard band."""
 
     rule: str
     """Rule in words; a test of significance is held at its level, without a guard band."""
@@ -118,7 +118,7 @@ def decide(distance: float, passed: bool, u: float | None, degrees_of_freedom: f
 
 
 class Verdict(StrEnum):
-    """Verdict of a finished job on its unit."""
+    """Verdict of a finished job on its unit: pass, fail, or error where nothing could be judged."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -144,7 +144,7 @@ def bounds(minimum: float | None, maximum: float | None, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Check:
-    """Check of one value against one limit."""
+    """Check of one value against one limit: passed or not, with its uncertainty and the decision."""
 
     name: str
     value: float

@@ -153,7 +153,7 @@ class Station:
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """Description of a recording, without its samples."""
+    """Description of a recording, without its samples: unit, channels, rate, count, station, hash, launch."""
 
     id: str
     unit: str

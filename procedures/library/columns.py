@@ -12,7 +12,7 @@ from procedures.core.errors import MissingChannel, UnfitRecording
 
 @dataclass(frozen=True)
 class Columns:
-    """Named columns of equal length."""
+    """Named columns of equal length, as read from a file."""
 
     names: tuple[str, ...]
     values: Array

@@ -47,7 +47,7 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class GyroChannel:
-    """Result of one gyro [rad/s]."""
+    """Result of one gyro [rad/s]: half difference, half sum, and their uncertainties."""
 
     channel: str
     horizontal: bool

@@ -77,7 +77,7 @@ class Params(Parameters):
 
 @dataclass(frozen=True)
 class TriadWorth:
-    """Performance of one triad under one plan."""
+    """Performance of one triad under one plan: worst uncertainty over limit, improvement, bound."""
 
     triad: str
     worst: float

@@ -70,7 +70,7 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class AxisResult:
-    """Fit of one accelerometer."""
+    """Fit of one accelerometer: uncertainties, spread before and after, tests of the order."""
 
     axis: str
     standard_uncertainties: tuple[float, ...]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from procedures.analysis.allan.freedom import ONE_SIGMA
+from procedures.analysis.allan.confidence_intervals import ONE_SIGMA
 from procedures.analysis.allan.statistic import HADAMARD, MODIFIED_ALLAN, OVERLAPPING_ALLAN
 from tests.validation.allan_coverage import COUNT, coverages, failures, limits, true_deviation
 

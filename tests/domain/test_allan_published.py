@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from procedures.analysis.allan.confidence_intervals import ONE_SIGMA, degrees_of_freedom, interval
 from procedures.analysis.allan.deviation import deviation
-from procedures.analysis.allan.freedom import ONE_SIGMA, degrees_of_freedom, interval
 from procedures.analysis.allan.statistic import (
     HADAMARD,
     MODIFIED_ALLAN,

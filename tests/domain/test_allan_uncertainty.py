@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import fft
 
+from procedures.analysis.allan.confidence_intervals import degrees_of_freedom
 from procedures.analysis.allan.deviation import deviation
-from procedures.analysis.allan.freedom import degrees_of_freedom
 from procedures.analysis.allan.statistic import (
     MODIFIED_ALLAN,
     OVERLAPPING_ALLAN,

@@ -33,7 +33,7 @@ def _ended(http, seconds: float) -> dict | None:
 def test_a_lease_lives_while_somebody_answers_clients(
     answers: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reader, "SILENT_S", SILENT_S)
+    monkeypatch.setattr(reader, "LEASE_SILENT_S", SILENT_S)
     beat = presence.Presence.__init__
     monkeypatch.setattr(presence.Presence, "__init__", lambda self, store: beat(self, store, 0.2))
     if not answers:

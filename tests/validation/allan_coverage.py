@@ -1,7 +1,8 @@
 """How often the intervals of Allan deviations hold the truth, noise by noise; judged by the binomial distribution.
 
-Allowed is the nominal coverage, widened where the docstring of `procedures.analysis.allan.freedom` says that its
-formulas are not exact, and by the scatter of the sample: all checks together fail by chance once in a thousand runs.
+Allowed is the nominal coverage, widened where the docstring of `procedures.analysis.allan.confidence_intervals` says
+that its formulas are not exact, and by the scatter of the sample: all checks together fail by chance once in a thousand
+runs.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.stats import binom
 
+from procedures.analysis.allan.confidence_intervals import ONE_SIGMA, degrees_of_freedom, interval
 from procedures.analysis.allan.deviation import Deviation, deviation
-from procedures.analysis.allan.freedom import ONE_SIGMA, degrees_of_freedom, interval
 from procedures.analysis.allan.statistic import (
     ALLAN,
     HADAMARD,
@@ -120,7 +121,7 @@ def _coverage(alpha: int, member: Statistic, i: int, m: int, results: list[Devia
 
 
 def declared(alpha: int, member: Statistic, m: int, confidence: float) -> tuple[float, float]:
-    """Least and greatest true coverage, as `freedom` declares it."""
+    """Least and greatest true coverage, as `confidence_intervals` declares it."""
     edf = degrees_of_freedom(member, alpha, m, COUNT)
     one_sigma = confidence == ONE_SIGMA
     low, high = confidence, confidence

@@ -63,7 +63,7 @@ class StopGuard:
         self._thread.start()
 
     def stopped(self) -> bool:
-        """True while a stop over the channel stands."""
+        """Return whether a stop over the channel stands."""
         return bool(self._channel.standing())
 
     def end(self) -> None:

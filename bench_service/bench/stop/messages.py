@@ -68,7 +68,7 @@ def new_number() -> str:
 
 
 def proof(secret: bytes, what: str, numbers: tuple[str, str], text: str) -> str:
-    """HMAC-SHA-256 over the kind of message, both numbers and the text, in hexadecimal."""
+    """Return the HMAC-SHA-256 over the kind of message, both numbers and the text, in hexadecimal."""
     return hmac.new(secret, "\n".join((what, *numbers, text)).encode(), hashlib.sha256).hexdigest()
 
 

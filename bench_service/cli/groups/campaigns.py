@@ -163,7 +163,7 @@ def add_schedule(
     overlap: Annotated[str, typer.Option(help="Starts while the previous run is open: skip or queue")] = "skip",
     server: Server = None,
 ) -> None:
-    """Start a campaign by itself: again and again (--cron), or once (--at)."""
+    """Add a schedule by which a campaign starts by itself: repeatedly (--cron), or once (--at)."""
     body = {
         **_times(cron, time_zone, at),
         "campaign": campaign,

@@ -81,7 +81,7 @@ def home(
     server: Server = None,
     as_json: AsJson = False,
 ) -> int:
-    """Lead all axes to zero. A table that does not know its zero is homed by a person, at its controller."""
+    """Move all axes to zero. A table that does not know its zero is homed by a person, at its controller."""
     return _demand(context, server, bench, key, no_wait, as_json, {"kind": "home", "by": by})
 
 
@@ -98,7 +98,7 @@ def go(
     server: Server = None,
     as_json: AsJson = False,
 ) -> int:
-    """Lead axes to angles, to rest."""
+    """Move axes to angles, and wait until they rest."""
     body = {"kind": "go_to", "outer_deg": outer_deg, "middle_deg": middle_deg, "inner_deg": inner_deg, "by": by}
     return _demand(context, server, bench, key, no_wait, as_json, body)
 
@@ -128,7 +128,7 @@ def rate(
 def halt(
     context: typer.Context, bench: Bench = None, by: By = None, server: Server = None, as_json: AsJson = False
 ) -> int:
-    """End a rate or a move: the table to rest."""
+    """End a rate or a move: bring the table to rest."""
     return _demand(context, server, bench, None, False, as_json, {"kind": "halt", "by": by})
 
 
@@ -143,7 +143,7 @@ def chamber(
     server: Server = None,
     as_json: AsJson = False,
 ) -> int:
-    """Lead the chamber's air to a temperature; returns once the controller has the set point."""
+    """Command the chamber's air to a temperature; returns once the controller has the set point."""
     body = {"kind": "chamber", "temperature_c": temperature_c, "ramp_c_min": ramp_c_min, "by": by}
     return _demand(context, server, bench, key, False, as_json, body)
 

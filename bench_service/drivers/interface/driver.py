@@ -36,7 +36,9 @@ def _untold(_event: str, _more: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class DriverContext:
-    """Surroundings of a device: what its driver is given besides its section."""
+    """Surroundings of a device for its driver: bench id, clock, folder of the bench file, declared unit, function for
+    notes.
+    """
 
     bench_id: str
     clock: Clock

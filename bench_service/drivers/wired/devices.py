@@ -69,7 +69,7 @@ class WiredDevices:
         return file
 
     def device_state(self) -> DeviceState | None:
-        """Read the register; asks no device."""
+        """Return the devices' last noted state from the register; asks no device."""
         return self._register.read()
 
     def compare(self, by: str) -> tuple[str, ...]:

@@ -219,7 +219,7 @@ class BenchFileDriver:
         self._register.journal.write(event, more, job=job)
 
     def device_state(self) -> DeviceState | None:
-        """Read the register; asks no device."""
+        """Return the devices' last noted state from the register; asks no device."""
         return self._devices.device_state()
 
     def compare(self, by: str) -> tuple[str, ...]:

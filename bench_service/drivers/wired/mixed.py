@@ -26,7 +26,7 @@ class FollowingClock(Protocol):
         ...
 
     def now_s(self) -> float:
-        """Bench time of the world [s]."""
+        """Return the bench time of the simulated world [s]."""
         ...
 
     async def sleep(self, seconds: float) -> None:

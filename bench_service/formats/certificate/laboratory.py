@@ -25,7 +25,7 @@ class Contact(BaseModel):
 
 
 class Person(BaseModel):
-    """Person who answers for the certificate."""
+    """A person who answers for the certificate: name, role, and whether it is the main signer."""
 
     model_config = ConfigDict(extra="forbid")
     name: Word
@@ -34,7 +34,7 @@ class Person(BaseModel):
 
 
 class Equipment(BaseModel):
-    """Reference equipment with its own certificate."""
+    """A reference device of the laboratory, with its serial and its own certificate."""
 
     model_config = ConfigDict(extra="forbid")
     name: Word

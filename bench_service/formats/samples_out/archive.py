@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from bench_service.formats.outbox import Outbox
+from bench_service.formats.samples_out.written_bytes import WrittenBytes
 
 MANIFEST = "manifest.json"
 BEGIN_OF_ZIP = (1980, 1, 1, 0, 0, 0)
@@ -20,7 +20,7 @@ def archived(
     The manifest has name, bytes and SHA-256 of each file besides its facts. Entries are stored without compression
     where their formats compress already, and always with 64-bit sizes, for they are not known before.
     """
-    outbox, listed = Outbox(), list[dict[str, Any]]()
+    outbox, listed = WrittenBytes(), list[dict[str, Any]]()
     with zipfile.ZipFile(outbox, "w", zipfile.ZIP_DEFLATED, allowZip64=True) as archive:
         for name, pieces, facts in files:
             digest, size = hashlib.sha256(), 0

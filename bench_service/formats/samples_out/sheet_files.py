@@ -27,7 +27,7 @@ MOST_IN_MATLAB = 8_000_000
 
 
 class SheetFormat(StrEnum):
-    """File format of a sheet."""
+    """File format in which a table of samples is exported."""
 
     CSV = "csv"
     PARQUET = "parquet"

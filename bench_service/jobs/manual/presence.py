@@ -12,7 +12,7 @@ from bench_service.model.errors import ServiceError
 
 BEAT_S = 5.0
 """Interval between two signs of life [s]."""
-SILENT_S = 20.0
+LEASE_SILENT_S = 20.0
 """Time without one after which a lease ends [s]: several beats of a database that is busy."""
 
 log = logging.getLogger(__name__)

@@ -1,7 +1,7 @@
 """Reads a lease that runs and writes what becomes of its demands, in a thread of its own.
 
 A database that hangs holds neither the bench nor the end of the lease's time. After `HANGS_S` without an answer of it
-the lease ends; so it does where no process that answers clients has given a sign of life for `SILENT_S`.
+the lease ends; so it does where no process that answers clients has given a sign of life for `LEASE_SILENT_S`.
 """
 
 import logging
@@ -9,7 +9,7 @@ from queue import SimpleQueue
 from threading import Event, Lock, Thread
 
 from bench_service.bench.driven import HANGS_S
-from bench_service.jobs.manual.presence import SILENT_S
+from bench_service.jobs.manual.presence import LEASE_SILENT_S
 from bench_service.jobs.manual.session import ManualSession
 from bench_service.jobs.manual.store import LeaseNews, ManualStore
 from bench_service.model.errors import ServiceError
@@ -107,8 +107,8 @@ class LeaseReader:
             self.because = f"the bench was stopped: {news.stopped}"
         elif news.lease.end_asked:
             self.because = f"ended by {news.lease.end_asked}"
-        elif monotonic_s() - self._heard_s > SILENT_S:
-            self.because = f"no process that serves clients has given a heartbeat for {SILENT_S:g} s"
+        elif monotonic_s() - self._heard_s > LEASE_SILENT_S:
+            self.because = f"no process that serves clients has given a heartbeat for {LEASE_SILENT_S:g} s"
         if self.because:
             session.leave(self.because)
             return

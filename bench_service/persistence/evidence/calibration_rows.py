@@ -66,7 +66,7 @@ def decision_row(decision: Decision) -> CalibrationDecisionRow:
 def calibrations_where(
     session: Session, *conditions: ColumnElement[bool] | InstrumentedAttribute[bool]
 ) -> list[StoredCalibration]:
-    """Read the calibrations that meet all conditions, in the order of their ids."""
+    """Return the calibrations that meet all conditions, in the order of their ids."""
     query = select(CalibrationRow).where(*conditions).order_by(CalibrationRow.id)
     return complete(session, session.scalars(query).all())
 

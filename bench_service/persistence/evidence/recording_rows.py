@@ -23,7 +23,7 @@ def station_of_row(row: RecordingRow) -> Station | None:
 
 
 def info_of_row(row: RecordingRow) -> RecordingInfo:
-    """Read the description of a recording from its row."""
+    """Return the description of a recording from its row."""
     return copied(
         RecordingInfo,
         row,

@@ -53,7 +53,7 @@ Id = String().with_variant(String(collation="C"), "postgresql")
 
 
 class Table(DeclarativeBase):
-    """Root class of all tables."""
+    """Root class of all SQL tables, with the metadata that migrations compare."""
 
     metadata = MetaData(
         naming_convention={

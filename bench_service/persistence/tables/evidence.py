@@ -284,7 +284,7 @@ class CorrectionDecisionRow(Table):
 
 
 class ResultCorrectionRow(Table):
-    """The correction sets that a result used."""
+    """A correction set that a result used, by its position among them."""
 
     __tablename__ = "result_corrections"
     __table_args__ = (Index("ix_result_corrections_correction_id", "correction_id"),)

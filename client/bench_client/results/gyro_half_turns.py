@@ -7,7 +7,7 @@ from bench_client.results.shared import Check, Statement, Verdict
 
 
 class GyroChannel(Part):
-    """Result of one gyro [rad/s]."""
+    """Result of one gyro [rad/s]: half difference, half sum, and their uncertainties."""
 
     channel: str
     """Name of the channel"""

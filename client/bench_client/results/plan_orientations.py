@@ -7,7 +7,7 @@ from bench_client.results.shared import Check, Statement, Verdict
 
 
 class TriadWorth(Part):
-    """Performance of one triad under one plan."""
+    """Performance of one triad under one plan: worst uncertainty over limit, improvement, bound."""
 
     triad: str
     """Triad: gyro or accelerometer"""

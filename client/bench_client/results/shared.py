@@ -19,7 +19,7 @@ class Limit(Part):
 
 
 class Decision(Part):
-    """How one value was decided."""
+    """How one value was decided: rule, outcome, expanded uncertainty, guard band."""
 
     rule: str
     """Rule in words; a test of significance is held at its level, without a guard band."""
@@ -38,7 +38,7 @@ class Decision(Part):
 
 
 class Check(Part):
-    """Check of one value against one limit."""
+    """Check of one value against one limit: passed or not, with its uncertainty and the decision."""
 
     name: str
     """Name"""

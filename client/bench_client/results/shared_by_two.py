@@ -204,7 +204,7 @@ class Reading(Part):
 
 
 class LaunchResultsCoefficient(Part):
-    """One noise process by the three methods."""
+    """One noise process of a channel as the three methods find it: graphical, least squares, likelihood."""
 
     process: str
     """Noise process"""
@@ -267,7 +267,7 @@ class TemperatureSlope(Part):
 
 
 class LevelShift(Part):
-    """One shift of the rate's level."""
+    """One shift of the rate's level: time, height, uncertainty."""
 
     at_s: float
     """Time since the launch [s]"""
@@ -403,7 +403,7 @@ class MeanCoefficient(Part):
 
 
 class ChannelSummary(Part):
-    """Summary of one channel over all launches."""
+    """Summary of one channel over all launches: mean coefficients, averaging time, change of the mean."""
 
     channel: str
     """Name of the channel"""

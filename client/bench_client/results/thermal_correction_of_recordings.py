@@ -7,7 +7,7 @@ from bench_client.results.shared import Check, Statement, ThermalCorrection, Ver
 
 
 class AxisResult(Part):
-    """Fit of one accelerometer."""
+    """Fit of one accelerometer: uncertainties, spread before and after, tests of the order."""
 
     axis: str
     """Axis"""

@@ -100,7 +100,7 @@ class RunFound(Part):
 
 
 class AxisFound(Part):
-    """Fit of one accelerometer's correction."""
+    """Fit of one accelerometer's correction: coefficients, residuals, tests of the polynomial order."""
 
     correction: AxisCorrection
     """The correction"""
@@ -242,7 +242,7 @@ class AllanFound(Part):
 
 
 class Following(Part):
-    """Law by which the converter's sensor follows the case's."""
+    """Law by which the converter's sensor follows the case's: delay, lag, heating, with uncertainties."""
 
     delay_s: float
     """Board's own delay Δ [s]"""

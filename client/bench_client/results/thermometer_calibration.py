@@ -7,7 +7,7 @@ from bench_client.results.shared import Check, Statement, ThermometerCorrection,
 
 
 class SensorFit(Part):
-    """Line of one sensor through its soaks."""
+    """Line of one sensor through its soaks: offset, slope, errors, test of straightness."""
 
     channel: str
     """Name of the channel"""

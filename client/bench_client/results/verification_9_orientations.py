@@ -58,7 +58,9 @@ class TriadDiagnosis(Part):
 
 
 class TriadVerification(Part):
-    """Verification result of one triad, JSON-ready."""
+    """Verification result of one triad: magnitudes, their test against the prediction, and the diagnosis. JSON-
+    ready.
+    """
 
     magnitudes: Magnitudes
     """Errors of the magnitude at the stations"""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.analysis.allan.confidence_intervals import ONE_SIGMA, degrees_of_freedom, interval
 from procedures.analysis.allan.correlated import CorrelatedSums, Uncorrelatable
 from procedures.analysis.allan.differences import NonOverlappingSums
-from procedures.analysis.allan.freedom import ONE_SIGMA, degrees_of_freedom, interval
 from procedures.analysis.allan.identification import exponents
 from procedures.analysis.allan.integral import Gaps, Integral
 from procedures.analysis.allan.overlapping import WHOLE, OverlappingSums

@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.analysis.allan.confidence_intervals import ONE_SIGMA, interval
 from procedures.analysis.allan.correlated import CorrelatedSums, SharedProducts, Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, deviation, from_sums
 from procedures.analysis.allan.differences import NonOverlappingSums
-from procedures.analysis.allan.freedom import ONE_SIGMA, interval
 from procedures.analysis.allan.integral import Integral
 from procedures.analysis.allan.overlapping import WHOLE
 from procedures.analysis.allan.statistic import MODIFIED_ALLAN, TIME, Sizes, Statistic, checked_sizes

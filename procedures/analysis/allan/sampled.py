@@ -23,7 +23,9 @@ POINTS = 1 << 20
 
 @dataclass(frozen=True)
 class Sampled:
-    """Deviations from sampled intervals, (k,) each."""
+    """Deviations from sampled intervals, (k,) each: sizes, averaging times, deviations, their uncertainties, intervals
+    used.
+    """
 
     sizes: Sizes
     tau_s: Array

@@ -30,7 +30,9 @@ from procedures.core.unit import Unit
 
 @dataclass(frozen=True)
 class TriadVerification:
-    """Verification result of one triad, JSON-ready."""
+    """Verification result of one triad: magnitudes, their test against the prediction, and the diagnosis.
+    JSON-ready.
+    """
 
     magnitudes: Magnitudes
     chi_square: float | None

@@ -9,7 +9,7 @@ from procedures.core.errors import BadParameter, UnfitRecording
 
 
 class Severity(StrEnum):
-    """Consequence of a finding for an analysis."""
+    """Consequence of a finding for an analysis: it is refused, or it warns."""
 
     REFUSE = "refuse"
     """The channel's numbers cannot be trusted; the analysis is refused."""
@@ -41,7 +41,9 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One flaw found in one channel."""
+    """One flaw found in one channel: its kind, its consequence, a sentence, the first sample and the number of
+    samples.
+    """
 
     kind: Kind
     severity: Severity
@@ -70,7 +72,7 @@ class ChannelFitness:
 
 @dataclass(frozen=True)
 class FitnessSettings:
-    """Requirements on a recording, in SI."""
+    """Requirements of an analysis on a recording (length, gaps, rest), and references for plausibility, in SI."""
 
     least_samples: int = 20
     """Fewest samples accepted: the standard uncertainty of a mean is taken from 20 batches (see `station_means`)."""

@@ -25,7 +25,7 @@ _GROUPS = 256
 
 @dataclass(frozen=True)
 class ChannelContext:
-    """Findings, resolution and temperatures of one channel."""
+    """Findings of the inspection, resolution and temperatures of one channel, for the fit of its noise."""
 
     findings: tuple[str, ...] = ()
     coarse: str = ""

@@ -60,7 +60,7 @@ class TemperatureSlope:
 
 @dataclass(frozen=True)
 class LevelShift:
-    """One shift of the rate's level."""
+    """One shift of the rate's level: time, height, uncertainty."""
 
     at_s: float
     """Time since the launch."""
@@ -71,7 +71,7 @@ class LevelShift:
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One noise process by the three methods."""
+    """One noise process of a channel as the three methods find it: graphical, least squares, likelihood."""
 
     process: str
     graphical: Reading

@@ -26,7 +26,7 @@ class MeanCoefficient:
 
 @dataclass(frozen=True)
 class ChannelSummary:
-    """Summary of one channel over all launches."""
+    """Summary of one channel over all launches: mean coefficients, averaging time, change of the mean."""
 
     channel: str
     rate_unit: str

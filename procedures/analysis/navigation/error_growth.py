@@ -37,7 +37,9 @@ SLOW = {
 
 @dataclass(frozen=True)
 class Alignment:
-    """Source of the navigator's initial attitude."""
+    """Source of the navigator's initial attitude: its own alignment of a duration, or a given attitude with standard
+    deviations.
+    """
 
     duration_s: float | None = None
     """Duration of the self-alignment with the same sensors; None: the attitude was given."""

@@ -25,7 +25,7 @@ FLAWS = 6
 
 @dataclass(frozen=True)
 class TriadDesign:
-    """Description of one triad for the search."""
+    """One triad as the search sees it: reference vector, noise of a dwell, limits of its coefficients, matrix."""
 
     triad: str
     vector_r: Array

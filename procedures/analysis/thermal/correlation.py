@@ -24,7 +24,7 @@ PASSES = 5
 
 @dataclass(frozen=True)
 class Correlation:
-    """Correlation of a signal with a temperature."""
+    """Correlation of a signal with a temperature: r, effective samples, slope, p-value."""
 
     r: float
     """Pearson's coefficient of the cells."""

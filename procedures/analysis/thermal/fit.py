@@ -36,7 +36,7 @@ RANK_TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class AxisFit:
-    """Fit of one accelerometer's correction."""
+    """Fit of one accelerometer's correction, with the noise, the residuals and the comparison of orders."""
 
     axis: int
     correction: AxisCorrection

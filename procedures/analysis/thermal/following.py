@@ -27,7 +27,7 @@ STEPS = (1.0, 0.05)
 
 @dataclass(frozen=True)
 class Following:
-    """Law by which the converter's sensor follows the case's."""
+    """Law by which the converter's sensor follows the case's: delay, lag, heating, with uncertainties."""
 
     delay_s: float
     """Board's own delay Δ."""

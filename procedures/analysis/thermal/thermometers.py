@@ -143,7 +143,7 @@ def _line(since_s: Array, readings_c: Array, tau: float) -> tuple[Array, Array, 
 
 @dataclass(frozen=True)
 class SensorFit:
-    """Line of one sensor through its soaks."""
+    """Line of one sensor through its soaks: offset, slope, errors, test of straightness."""
 
     channel: str
     offset_c: float

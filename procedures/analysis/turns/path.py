@@ -23,7 +23,7 @@ MOST_STEP_RAD = 0.1
 
 @dataclass(frozen=True)
 class Course:
-    """Integrals over one recording."""
+    """Integrals over one recording of whole turns: of cos θ and sin θ [s], and the moments of the rate."""
 
     cosine_s: float
     """``∫cos θ dt`` [s], θ from the recording's beginning."""

@@ -67,7 +67,7 @@ class RunFound:
 
 @dataclass(frozen=True)
 class AxisFound:
-    """Fit of one accelerometer's correction."""
+    """Fit of one accelerometer's correction: coefficients, residuals, tests of the polynomial order."""
 
     correction: AxisCorrection
     uncertainties: tuple[float, ...]

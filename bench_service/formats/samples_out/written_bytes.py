@@ -1,7 +1,7 @@
 """Write-only file object for writers whose files are streamed while they are written."""
 
 
-class Outbox:
+class WrittenBytes:
     """Write-only file object: collects bytes until they are taken; not seekable."""
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Equivalent degrees of freedom of the Allan family, and chi-square intervals.
+"""Confidence intervals of Allan deviations: equivalent degrees of freedom, and the chi-square interval made from them.
 
 C. A. Greenhall and W. J. Riley, "Uncertainty of Stability Variances Based on Finite Differences", PTTI 2003, the
 combined algorithm; NIST SP 1065, 5.4.1 (edf) and eq. 45 (interval).
@@ -149,7 +149,9 @@ def _w(t: Array, alpha: int) -> Array:
 
 
 def interval(deviation: Array, edf: Array, confidence: float) -> tuple[Array, Array]:
-    """``σ·√(edf/χ²)`` at the two quantiles ``(1 ± confidence)/2`` of χ² with edf degrees of freedom (eq. 45)."""
+    """Return the ends of the interval, (k,) each: ``σ·√(edf/χ²)`` at the two quantiles ``(1 ± confidence)/2`` of χ²
+    with edf degrees of freedom (eq. 45). Raises `BadParameter` for a confidence outside 0 … 1.
+    """
     if not 0.0 < confidence < 1.0:
         raise BadParameter("confidence", confidence, "0 < confidence < 1")
     low, high = (2.0 * gammaincinv(edf / 2.0, (1.0 + side * confidence) / 2.0) for side in (1.0, -1.0))
