@@ -36,12 +36,7 @@ from procedures.analysis.calibration.triad_verification import (
     verify_triad,
 )
 from procedures.analysis.calibration.verification import predicted_sd
-from procedures.analysis.orientation_plan.requirements import (
-    IN_RUN_LEVEL,
-    chance_of_failure,
-    in_run_check,
-    in_run_unresolved,
-)
+from procedures.analysis.orientation_plan import requirements
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -148,7 +143,10 @@ def predict(params: Params, context: Context) -> Prediction:
     uncertainties = tuple(u for plan in plans for u in (*_predicted(plan), *_predicted_changes(plan, params, context)))
     stations = schedule(params)
     duration_s = float(windows(expected_stations(stations), context.bench.axis_motion)[-1, 1])
-    warnings = _warnings(plans, params.limits) + _chances(plans, params.limits) + params.dwell_warnings(stations)
+    limits = (params.limits.gyro_bias_in_run_deg_h, params.limits.accelerometer_bias_in_run_m_s2)
+    judged = [_in_run(p, params.limits) for p, limit in zip(plans, limits, strict=True) if limit is not None]
+    chances = requirements.chances_of_failure(judged)
+    warnings = _warnings(plans, params.limits) + chances + params.dwell_warnings(stations)
     return Prediction(duration_s, uncertainties, warnings, basis(plans) if uncertainties else "")
 
 
@@ -257,8 +255,8 @@ def _warnings(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
     gyro, accelerometer = plans
     bias, force = limits.gyro_bias_in_run_deg_h, limits.accelerometer_bias_in_run_m_s2
     in_run = (
-        None if bias is None else in_run_unresolved(gyro, bias * deg_h, "deg/h", deg_h),
-        None if force is None else in_run_unresolved(accelerometer, force, "m/s^2", 1.0),
+        None if bias is None else requirements.in_run_unresolved(gyro, bias * deg_h, "deg/h", deg_h),
+        None if force is None else requirements.in_run_unresolved(accelerometer, force, "m/s^2", 1.0),
     )
     found = [w for w in in_run if w is not None]
     for plan in plans:
@@ -273,20 +271,13 @@ def _warnings(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _chances(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
-    """Sentences on limits that a sound unit may well exceed; one that the plan makes has its level."""
-    declared = (limits.gyro_bias_in_run_deg_h, limits.accelerometer_bias_in_run_m_s2)
-    found = [chance_of_failure(_in_run(p, limits)) for p, own in zip(plans, declared, strict=True) if own is not None]
-    return tuple(w for w in found if w is not None)
-
-
 def _in_run(plan: TriadPlan, limits: Limits) -> PlannedCheck:
     gyro = plan.triad == "gyro"
     maximum = limits.gyro_bias_in_run_deg_h if gyro else limits.accelerometer_bias_in_run_m_s2
     level = limits.prediction_p_value_min
     if maximum is None and level == 0.0:
         raise BadParameter("limits.prediction_p_value_min", level, "above 0: the limit of the plan is made with it")
-    return in_run_check(plan, maximum, planned_covariance(plan), level or IN_RUN_LEVEL)
+    return requirements.in_run_check(plan, maximum, planned_covariance(plan), level or requirements.IN_RUN_LEVEL)
 
 
 def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check]:

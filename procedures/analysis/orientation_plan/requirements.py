@@ -1,5 +1,6 @@
 """Limits on a calibration compared with its plan: those that it cannot resolve, and the check of the bias in run."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -172,6 +173,12 @@ def chance_of_failure(planned: PlannedCheck) -> str | None:
         f"{100.0 * chance:.2g} %, for noise, the calibration's uncertainty and the unit's change between launches make "
         f"about {planned.standard_uncertainty:.2g} {limit.unit}: such a FAIL alone is no fault of the unit"
     )
+
+
+def chances_of_failure(planned: Sequence[PlannedCheck]) -> tuple[str, ...]:
+    """Warnings of all planned checks that a sound unit fails oftener than `RARE`."""
+    found = (chance_of_failure(one) for one in planned)
+    return tuple(warning for warning in found if warning is not None)
 
 
 def _length(dwell_s: float) -> str:
