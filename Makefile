@@ -5,7 +5,7 @@ PORT   ?= 8000
 WORKERS ?= 2
 VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access absence document pdf_a certificates acceptance wires_campaign wires_thermal wires_response
 FOREIGN := basil edie instro ixcom moto visa
-LONG_BENCHMARKS := $(addprefix tests.benchmarks.,growth lists analysis_workers)
+LONG_BENCHMARKS := $(addprefix tests.benchmarks.,growth lists analysis_workers large_bags)
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
@@ -18,6 +18,7 @@ help:  ## this list
 
 $(VENV)/.ready: requirements.lock pyproject.toml
 	@$(PYTHON) .preflight.py
+	@echo "installing the packages of requirements.lock into $(VENV): about two minutes the first time"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet --disable-pip-version-check uv
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --compile-bytecode --require-hashes -r requirements.lock
@@ -65,7 +66,7 @@ validate: $(VENV)/.ready .foreign/verapdf/.ready  ## Monte Carlo against theory 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
-bench-long: $(VENV)/.ready  ## growth of cost with size, lists over 10^5 jobs and 10^6 recordings, workers of analyses; an hour
+bench-long: $(VENV)/.ready  ## growth of cost with size, lists over 10^5 jobs and 10^6 recordings, workers of analyses, bags of 2 GB; an hour
 	@kept=0; for part in $(LONG_BENCHMARKS); do echo "== $$part"; $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
 bench-against: $(VENV)/.ready  ## this checkout beside revision REV (e36ea0a), built beside it, in turns; ONLY=static,allan ROUNDS=5

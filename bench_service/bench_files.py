@@ -64,7 +64,11 @@ class BenchFiles:
         return keeper
 
     def _is_safe(self) -> bool:
-        state = self._devices.device_state()
+        """Return whether the devices report that they are safe; not where their register cannot be read."""
+        try:
+            state = self._devices.device_state()
+        except OSError:  # no descriptor left, for one
+            return False
         return state is not None and state.safe
 
 

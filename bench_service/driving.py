@@ -5,6 +5,7 @@ from functools import partial
 
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import Heartbeat, LiveBoard
+from bench_service.bench.processes import Watch
 from bench_service.bench.worker_patience import ending_s
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
@@ -56,7 +57,7 @@ def driving(
     worker = Worker(
         runner, partial(_engine, settings, patience_s), partial(_dispatcher, settings, stores, lease, files, manual)
     )
-    guard = files.guard(partial(_stop_now, runner, manual), worker.wake)
+    guard = files.guard(partial(_stop_now, runner, manual, files.host), worker.wake)
     guard.begin()
     closing.callback(guard.end)
     closing.callback(files.keep_books(stores).end)
@@ -85,7 +86,12 @@ def _dispatcher(
     return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s, files.stopped, manual)
 
 
-def _stop_now(jobs: JobRunner, manual: ManualRunner) -> None:
-    """Leave whatever drives the bench, and make the bench safe; called by the stop guard."""
+def _stop_now(jobs: JobRunner, manual: ManualRunner, watch: Watch) -> None:
+    """Leave whatever drives the bench, and make the bench safe.
+
+    Called by the stop guard, again and again while a stop stands and the bench is not safe.
+    """
     manual.stop_now()
     jobs.stop_now()
+    if watch.supervisor() is None:
+        jobs.try_again()

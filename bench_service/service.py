@@ -145,7 +145,8 @@ class BenchService:
         if self._runner is not None and self._runner.resumes:
             self._runner.begin()
         if self._worker is not None:
-            self._worker.begin([lambda: self.catalogue.procedures, lambda: self.catalogue.methods])
+            warm_up = [lambda: self.catalogue.procedures, lambda: self.catalogue.methods]
+            self._worker.begin(warm_up if self._driver is None else [self._driver.warm_up, *warm_up])
             self.campaigns.conductor.begin()
             self._nightly.begin()
 

@@ -11,7 +11,7 @@ from procedures.analysis.fitness.findings import Kind
 from procedures.analysis.fitness.watched import Inspection, Watch
 from procedures.analysis.measured_stations import at_measured_angles
 from procedures.core.errors import BadParameter, DomainError, MissingChannel
-from procedures.core.limits import Check, OutcomeName, Verdict, decided
+from procedures.core.limits import BOUND_RULE, Check, OutcomeName, Verdict, decided, verdict
 from procedures.core.recording import Recording, cut
 from procedures.core.unit import Unit
 from procedures.parameters import DecisionRules
@@ -64,25 +64,32 @@ def judged(outcome: R, params: object) -> R:
     checks = tuple(decided(c, rules.of(c.name)) for c in outcome.checks)
     if not checks:
         return outcome
-    failed = any(not c.passed for c in checks)
-    final = Verdict.FAIL if failed and outcome.verdict is Verdict.PASS else outcome.verdict
+    final = outcome.verdict
+    if final in (Verdict.PASS, verdict(outcome.checks)):
+        final = verdict(checks)
     unused = [name for name in rules.by_check if name not in {c.name for c in checks}]
     warnings = tuple(f"the decision rule for {name!r} was not used: there is no such check" for name in unused)
-    statement = None if final is Verdict.ERROR else _statement(checks, final, rules)
+    judged_by_checks = final is not Verdict.ERROR or verdict(checks) is Verdict.ERROR
+    statement = _statement(checks, final, rules) if judged_by_checks else None
     changed = {"checks": checks, "verdict": final, "warnings": (*outcome.warnings, *warnings), "statement": statement}
     return outcome.model_copy(update=changed)
 
 
 def _statement(checks: Sequence[Check], final: Verdict, rules: DecisionRules) -> Statement:
-    """A pass is conditional where any value is near its limit, a fail where each value that fails is."""
+    """A pass is conditional where any value is near its limit, a fail where each value that fails is.
+
+    It is inconclusive where no check fails and one decides nothing.
+    """
     near = tuple(c.name for c in checks if c.decision is not None and c.decision.conditional)
-    deciding = [c for c in checks if final is Verdict.PASS or not c.passed]
+    deciding = [c for c in checks if final is Verdict.PASS or not (c.passed or c.inconclusive)]
     sure = [c.decision is None or not c.decision.conditional for c in deciding]
     conditional = not all(sure) if final is Verdict.PASS else bool(deciding) and not any(sure)
     outcome: OutcomeName = "pass" if final is Verdict.PASS else "fail"
     if conditional:
         outcome = "conditional pass" if final is Verdict.PASS else "conditional fail"
-    own = {str(rules.of(c.name)) for c in checks if not c.significance}
+    if final is Verdict.ERROR:
+        outcome = "inconclusive"
+    own = {BOUND_RULE if c.inconclusive else str(rules.of(c.name)) for c in checks if not c.significance}
     return Statement(outcome, "; ".join(sorted(own)) or "test of significance", near)
 
 

@@ -17,8 +17,7 @@ from bench_service.api.http.queries import Searched
 from bench_service.evidence.admission import Places
 from bench_service.evidence.recordings import require_undamaged
 from bench_service.formats.description import ImportDescription
-from bench_service.formats.export import Extract, export, export_bytes, extract
-from bench_service.formats.export_format import ExportFormat
+from bench_service.formats.export import ExportFormat, Extract, export, export_bytes, extract, require_samples
 from bench_service.formats.import_request import ImportFile
 from bench_service.formats.overview import overview
 from bench_service.formats.plain_json import shown
@@ -130,7 +129,9 @@ async def read_data(
     start_s: Annotated[
         float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s]")
     ] = None,
-    stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
+    stop_s: Annotated[
+        float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s], not included")
+    ] = None,
 ) -> StreamingResponse:
     """Stream the raw samples, whole or by channel and time; none are held in memory, however long the recording.
 
@@ -152,7 +153,9 @@ def _part(
     service: BenchService, recording_id: str, names: list[str] | None, start_s: float | None, stop_s: float | None
 ) -> Extract:
     stored = service.stores.recordings.get(recording_id)
-    return extract(stored.info, stored.dtype, names, start_s, stop_s)
+    part = extract(stored.info, stored.dtype, names, start_s, stop_s)
+    require_samples(part, start_s, stop_s)
+    return part
 
 
 def _exported(service: BenchService, part: Extract, form: ExportFormat) -> AdmittedStream:
@@ -192,7 +195,9 @@ def read_overview(
     start_s: Annotated[
         float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s]")
     ] = None,
-    stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
+    stop_s: Annotated[
+        float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s], not included")
+    ] = None,
     bins: Annotated[int, Query(ge=1, le=5000)] = 800,
 ) -> OverviewView:
     """Read least, mean and greatest values of a stretch in bins: what a plot needs, however long the recording."""

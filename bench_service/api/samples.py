@@ -17,7 +17,7 @@ from bench_service.api.recordings import EXPORTS
 from bench_service.evidence.recordings import require_undamaged
 from bench_service.evidence.samples import treatment_of
 from bench_service.formats.chunk import RAW_BYTES
-from bench_service.formats.export import Extract, extract
+from bench_service.formats.export import Extract, extract, require_samples
 from bench_service.formats.samples_out.archive import archived
 from bench_service.formats.samples_out.mcap_file import BEGAN
 from bench_service.formats.samples_out.sheet import LARGEST_FACTOR, Sheet, Treatment, physical_sheet, raw_sheet
@@ -70,7 +70,9 @@ async def read_samples(
     start_s: Annotated[
         float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s]")
     ] = None,
-    stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
+    stop_s: Annotated[
+        float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s], not included")
+    ] = None,
 ) -> StreamingResponse:
     """Stream a recording's samples with a column of time, in SI with units in the names, or raw.
 
@@ -82,6 +84,7 @@ async def read_samples(
         stored = service.stores.recordings.get(recording_id)
         treatment = treatment_of(service.stores, stored.info.unit, corrected_by, decimate)
         part = extract(stored.info, stored.dtype, names, start_s, stop_s)
+        require_samples(part, start_s, stop_s)
         return written(_dated(stored, _sheet(service, part, values, treatment)), form)
 
     return await _admitted(begun, form, "application/octet-stream", f"{recording_id}.{form.value}")

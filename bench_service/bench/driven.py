@@ -23,6 +23,8 @@ TIME_LIMITS = TimeLimits()
 """Time limits for the answers of devices."""
 UNWIND_S = 1.0
 """Time that a procedure may take to leave a cancelled verb [s, real time]."""
+LEAVE_S = 3.0
+"""Time that a procedure's own ending may take before the devices are made safe all the same [s, real time]."""
 STOPPED = "stopped by an operator"
 STOP_CHECK_S = 0.2
 """Interval at which a move, a settle or a recording checks for a requested stop [s, real time]."""
@@ -63,6 +65,8 @@ class DrivenBench:
         self._stop_wanted = NonBlockingQuery("stop", stop_wanted)
         self._unanswered_s = 0.0
         self._unwinding: set[asyncio.Task[Any]] = set()
+        self._before_safe: frozenset[asyncio.Task[Any]] | None = None
+        """Tasks that were there when making safe began; None: it is not under way."""
         self._shutting_down = threading.Event()
         self._stopped = threading.Event()
         self._under_way: Future[Any] | None = None
@@ -231,13 +235,17 @@ class DrivenBench:
     async def _unwound(self) -> None:
         """Wait for every task of the bench's loop but those that wait here, or that make safe.
 
-        Two stops would wait for each other, and braking may take longer than work takes to unwind.
+        Two stops would wait for each other, and braking may take longer than work takes to unwind. Real devices brake
+        in tasks of their own: once making safe has begun, tasks that were not there before belong to it.
         """
         own = asyncio.current_task(self._loop)
         assert own is not None
         self._unwinding.add(own)
         try:
-            await asyncio.gather(*(asyncio.all_tasks(self._loop) - self._unwinding), return_exceptions=True)
+            left = asyncio.all_tasks(self._loop) - self._unwinding
+            await asyncio.gather(
+                *(left if self._before_safe is None else left & self._before_safe), return_exceptions=True
+            )
         finally:
             self._unwinding.discard(own)
 
@@ -245,12 +253,25 @@ class DrivenBench:
         own = asyncio.current_task(self._loop)
         assert own is not None
         self._unwinding.add(own)
+        self._before_safe = frozenset(asyncio.all_tasks(self._loop) - self._unwinding)
         try:
-            await self._leave()
-        except Exception:  # a defect in the procedure's own ending says nothing of the devices
-            log.exception("%s: its procedure's step could not be left in order", self._name)
+            await self._leave_in_time()
         finally:
             try:
                 await self._bench.make_safe()
             finally:
                 self._unwinding.discard(own)
+                self._before_safe = None
+
+    async def _leave_in_time(self) -> None:
+        """Leave the work, for `LEAVE_S` at the most; a defect in a procedure's own ending says nothing of devices."""
+        leaving = asyncio.ensure_future(self._leave())
+        try:
+            await asyncio.wait((leaving,), timeout=LEAVE_S)
+            late = not leaving.done()
+        finally:
+            leaving.cancel()
+        if late:
+            log.error("%s: its procedure's step could not be left within %g s", self._name, LEAVE_S)
+        elif not leaving.cancelled() and (failure := leaving.exception()) is not None:
+            log.error("%s: its procedure's step could not be left in order", self._name, exc_info=failure)

@@ -66,6 +66,10 @@ class BenchDriver(BenchDevices, Protocol):
         """
         ...
 
+    def warm_up(self) -> None:
+        """Load, while no job runs, what a device of the first job would otherwise load during a demand."""
+        ...
+
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
         """Return the true values of a simulated unit in a job with this seed, one a triad; empty on a real bench."""
         ...

@@ -46,8 +46,13 @@ class Obstacle:
         """All reasons in one line, joined by semicolons."""
         return "; ".join(self.reasons)
 
+    @property
+    def reason(self) -> str:
+        """The reason of a stop, whose subject is the bench."""
+        return f"could not be made safe: {self.why}"
+
     def __str__(self) -> str:
-        return self.why if self.busy else f"could not be made safe: {self.why}"
+        return self.why if self.busy else self.reason
 
 
 @dataclass(frozen=True)
@@ -67,14 +72,39 @@ def over_new_link(devices: BenchDevices, by: str) -> Obstacle | None:
     they are safe. Safe devices get no command.
     """
     try:
-        devices.make_safe(by)
+        state = devices.make_safe(by)
     except DeviceBusy as busy:
         return Obstacle((str(busy),), busy=True)
     except BenchError as error:
         return Obstacle((str(error),))
     except ExceptionGroup as group:
         return Obstacle(tuple(map(str, group.exceptions)))
-    return None
+    except OSError as error:  # another user's file, or no descriptor left
+        return Obstacle((f"the devices' register cannot be used: {error}",))
+    return None if state.safe else Obstacle(state.unsafe)
+
+
+def has_register(devices: BenchDevices) -> bool:
+    """Return whether devices have a register on this host; True also where it cannot be read now."""
+    try:
+        return devices.device_state() is not None
+    except OSError:  # no descriptor left, for one: a stop must not end here
+        return True
+
+
+def still_unsafe(devices: BenchDevices, by: str, of: str) -> str | None:
+    """The reason to stop a bench whose devices do not read as safe at the end `of` something, by their register.
+
+    To be called once every device has reported that it is safe and nothing else can reach them; None: they are safe, or
+    have no register. They are made safe over a new link then; the bench is stopped all the same, as nobody knows the
+    cause.
+    """
+    state = devices.device_state()
+    if state is None or state.safe:
+        return None
+    obstacle = over_new_link(devices, by)
+    then = "it was made safe afterwards, over a new link" if obstacle is None else f"it {obstacle}"
+    return f"was not safe at the end of {of}: {' and '.join(state.unsafe)}; {then}"
 
 
 @dataclass(frozen=True)

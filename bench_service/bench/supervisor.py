@@ -3,7 +3,8 @@
 It looks at four things: which process drives the bench and whether it lives, the devices' last reported state,
 whether the bench is stopped, and whether the driving process gives its heartbeat. It restarts nothing.
 While the process that drives the bench lives, it ends one that does not answer a stop, or gives no heartbeat while the
-bench is not safe, and commands the devices only of a stopped bench whose link was given back.
+bench is not safe, and commands the devices only where their link was given back and they are not safe: of a stopped
+bench after a second, of another one after five.
 
 It acts on files of its host alone; a database that does not answer is updated later.
 """
@@ -37,6 +38,10 @@ LEASE_S = 0.8
 """Time that it waits for the lease of a dead worker [s]: after it the devices' own link, exclusive too, must do."""
 AGAIN_S = 1.0
 """Interval between two attempts to make devices safe that could not be made safe [s]."""
+LEFT_S = 5.0
+"""Time after which devices are made safe that a living worker of a bench without a stop has left unsafe [s]: it could
+not reach them, nor the database to stop the bench.
+"""
 LINGER_S = 60.0
 """Time that it stays after a crash, once the bench is safe [s]."""
 
@@ -182,23 +187,23 @@ class Supervisor:
     def _end_hung(
         self, now_s: float, worker: ProcessIdentity, state: DeviceState | None, words: frozenset[str]
     ) -> None:
-        """Kill a worker that leaves the devices unsafe under its link, and is unresponsive, silent or hung."""
-        if state is None or state.safe or not state.linked:
+        """Kill a worker with the devices' link that leaves them unsafe and is silent or hung, or answers no stop."""
+        if state is None or not state.linked:
             self._patience.reset(now_s)
             return
-        why = self._patience.over(now_s, worker, words, self._stopped)
+        why = self._patience.over(now_s, worker, words, self._stopped, state.safe)
         if why is not None and worker.kill():
-            self._say(f"{worker} {why} ({', '.join(state.unsafe)}): killed", state.job)
+            self._say(f"{worker} {why} ({', '.join(state.unsafe) or 'the devices are safe'}): killed", state.job)
             self._patience.reset(now_s)
 
     def _look_for_left(self, now_s: float, state: DeviceState | None) -> None:
         """Make devices safe that a living worker has left unsafe and given back: it does nothing more with them."""
-        if not self._stopped or state is None or state.safe or state.linked:
+        if state is None or state.safe or state.linked:
             self._left_since_s = None
         elif self._left_since_s is None:
             self._left_since_s = now_s
-        elif now_s - self._left_since_s > AGAIN_S and now_s >= self._next_try_s:
-            self._try(now_s, "the bench is stopped", state)
+        elif now_s - self._left_since_s > (AGAIN_S if self._stopped else LEFT_S) and now_s >= self._next_try_s:
+            self._try(now_s, "the bench is stopped" if self._stopped else "its worker has left it unsafe", state)
 
     def _rescue(self, now_s: float, driving: Driving | None, state: DeviceState) -> None:
         """Make an unsafe bench safe that no process drives."""

@@ -1,5 +1,5 @@
-"""Time limits that a supervisor sets a worker whose bench is not safe: one that leaves a stop unanswered, gives no
-heartbeat, or has seen a stop and does not get the bench safe.
+"""Time limits that a supervisor sets a worker with the devices' link: one that leaves a stop unanswered, gives no
+heartbeat while its bench is not safe, or has seen a stop and does not get the bench safe.
 
 Delays are summed look by look on the supervisor's own clock, so neither a clock that jumps nor a supervisor that was
 held up itself makes a worker late.
@@ -12,7 +12,7 @@ from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.stop.channel import WORKER, StopChannel
 
 UNANSWERED_S = 3.0
-"""Time that a worker may leave a stop unanswered, while its bench is not safe, before it is killed [s]."""
+"""Time that a worker may leave a stop unanswered, while it has the devices' link, before it is killed [s]."""
 HUNG_S = 10.0
 """Shortest time that a worker is given from seeing a stop until the bench is safe, before it is killed [s]."""
 MARGIN_S = 5.0
@@ -56,17 +56,25 @@ class WorkerPatience:
         self._held_s = dict.fromkeys(self._limits_s)
         self._looked_s = now_s
 
-    def over(self, now_s: float, worker: ProcessIdentity, words: frozenset[str], stopped: bool) -> str | None:
-        """The reason to kill the worker, which has its devices' link and leaves them unsafe; None: not yet.
+    def over(
+        self, now_s: float, worker: ProcessIdentity, words: frozenset[str], stopped: bool, safe: bool = False
+    ) -> str | None:
+        """The reason to kill the worker, which has its devices' link; None: not yet.
 
-        `words`: the stops in the channel; `stopped`: True where the bench is, by them or by the database.
+        `words`: the stops in the channel; `stopped`: True where the bench is, by them or by the database. `safe`: True
+        while the devices are; then only a stop without an answer counts. A worker that was suspended would command them
+        when it continues, and nobody could say meanwhile that the bench is safe.
         """
         passed_s = min(max(now_s - self._looked_s, 0.0), COUNTED_S)
         self._looked_s = now_s
         beat = self._heartbeat.last(worker)
         silent, self._beat = beat == self._beat, beat
         unanswered = bool(words - self._channel.answered(WORKER).seen)
-        for name, holds in (("silent", silent), ("unanswered", unanswered), ("hung", stopped)):
+        for name, holds in (
+            ("silent", silent and not safe),
+            ("unanswered", unanswered),
+            ("hung", stopped and not safe),
+        ):
             since = self._held_s[name] if holds else None  # None: it did not hold at the look before
             self._held_s[name] = None if not holds else 0.0 if since is None else since + passed_s
         return next((self._why(name) for name, held_s in self._held_s.items() if self._too_long(name, held_s)), None)

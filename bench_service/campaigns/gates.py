@@ -49,7 +49,7 @@ def _became_of(step: StepRun) -> str:
     if step.verdict is Verdict.PASS:
         return "passed"
     if step.verdict is Verdict.FAIL:
-        failed = [_sentence(c) for c in step.checks if not c.passed]
+        failed = [_sentence(c) for c in step.checks if not (c.passed or c.inconclusive)]
         more = f" and {len(failed) - MOST_CHECKS} more" if len(failed) > MOST_CHECKS else ""
         return f"failed ({', '.join(failed[:MOST_CHECKS])}{more})"
     return f"gave no verdict ({step.reason})" if step.reason else "gave no verdict"

@@ -14,7 +14,7 @@ from bench_service.model.errors import NotFound
 from bench_service.model.quantities import quantity
 from bench_service.model.records import StoredResult
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, Verdict, check
+from procedures.core.limits import Check, Limit, Verdict, check, verdict
 from procedures.core.units import converted
 
 CHECKS = TypeAdapter(tuple[Check, ...])
@@ -52,7 +52,10 @@ def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) 
             continue
         added += judged
         warnings += said
-    return Judgement(_worst(result.verdict, added, failures), (*own, *added), tuple(warnings), "; ".join(failures))
+    worst = Verdict.ERROR if failures else _worst(result.verdict, own, added)
+    undecided = [f"{c.name} is inconclusive" for c in (*own, *added) if c.inconclusive]
+    reasons = (*failures, *(undecided if worst is Verdict.ERROR else ()))
+    return Judgement(worst, (*own, *added), tuple(warnings), "; ".join(reasons))
 
 
 def checks_of(document: dict[str, Any]) -> tuple[Check, ...]:
@@ -60,10 +63,12 @@ def checks_of(document: dict[str, Any]) -> tuple[Check, ...]:
     return CHECKS.validate_python(document.get("checks", []))
 
 
-def _worst(own: Verdict, added: Sequence[Check], failures: Sequence[str]) -> Verdict:
-    if own is Verdict.ERROR or failures:
-        return Verdict.ERROR
-    return Verdict.PASS if own is Verdict.PASS and all(c.passed for c in added) else Verdict.FAIL
+def _worst(own: Verdict, checks: Sequence[Check], added: Sequence[Check]) -> Verdict:
+    """The verdict of a result and of the checks added to its own. An error that its checks do not explain stays one."""
+    undecided = own is Verdict.ERROR and any(c.inconclusive for c in checks)
+    if added and (own is Verdict.PASS or undecided):
+        return verdict((*checks, *added))
+    return own
 
 
 def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> Check:
@@ -75,7 +80,7 @@ def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> 
     source = f"campaign {campaign.name}" + (f": {limit.source}" if limit.source else "")
     wanted = Limit(limit.unit, limit.maximum, limit.minimum, source)
     uncertainty = None if found.standard_uncertainty is None else found.standard_uncertainty * size
-    made = check(f"{limit.quantity}, campaign's limit", found.value * size, wanted, uncertainty)
+    made = check(f"{limit.quantity}, campaign's limit", found.value * size, wanted, uncertainty, bound=found.bound)
     return decided(made, rule_of(limit, campaign.decision))
 
 

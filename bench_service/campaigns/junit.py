@@ -1,8 +1,8 @@
 """A campaign run as JUnit XML for a CI system: the run is the document, a step a suite, a check a case.
 
-A check that missed its limit is a failure, a step without a verdict an error, a step left out is skipped. A step that
-has no check of its own still has one case, so that nothing is lost between the lines; a run whose verdict is no step's
-(it could not begin, was cancelled or ran out of time before a step) has a suite of its own for it.
+A check that missed its limit is a failure, an inconclusive one or a step without a verdict an error, a step left out is
+skipped. A step that has no check of its own still has one case, so that nothing is lost between the lines; a run whose
+verdict is no step's (it could not begin, was cancelled or ran out of time before a step) has a suite of its own for it.
 """
 
 import re
@@ -93,7 +93,7 @@ def _cases(run: CampaignRun, step: StepRun) -> list["TestCase"]:
     from junitparser import Error, Failure, Skipped
 
     cases = [_checked(run, step, check) for check in step.checks]
-    missed = any(not check.passed for check in step.checks)
+    missed = any(not (check.passed or check.inconclusive) for check in step.checks)
     verdict_is_said = bool(cases) and (step.verdict is Verdict.PASS or (step.verdict is Verdict.FAIL and missed))
     if step.state in (StepState.SUCCEEDED, StepState.FAILED) and verdict_is_said:
         cases[0].time = _seconds(step.started_at, step.finished_at)
@@ -114,10 +114,12 @@ def _cases(run: CampaignRun, step: StepRun) -> list["TestCase"]:
 
 
 def _checked(run: CampaignRun, step: StepRun, check: Check) -> "TestCase":
-    from junitparser import Failure
+    from junitparser import Error, Failure
 
     case = _case(run, step, check.name)
-    if not check.passed:
+    if check.inconclusive:
+        case.result = [Error(_text(f"inconclusive: {_sentence(check)}"), "Inconclusive")]
+    elif not check.passed:
         failure = Failure(_text(_sentence(check)), "Limit")
         failure.text = _text(check.note or _sentence(check))
         case.result = [failure]

@@ -42,7 +42,7 @@ class Overlap(StrEnum):
 @dataclass(frozen=True)
 class Schedule:
     """A campaign that is run on a unit repeatedly, by a cron expression in a time zone, with its next and last
-    start.
+    start; or once, at the next start alone.
     """
 
     id: str
@@ -58,6 +58,8 @@ class Schedule:
     start_within_s: float = 300.0
     """Delay beyond which a start counts as missed [s]."""
     overlap: Overlap = Overlap.SKIP
+    once: bool = False
+    """Whether the next start is the only one: after it the schedule is switched off."""
     labels: dict[str, str] = field(default_factory=dict[str, str])
     team: str = ""
     """Team whose members change it, and act on its runs; empty: every engineer, and every operator on the runs."""

@@ -42,6 +42,7 @@ class ScheduleRequest:
     missed: Missed = Missed.RUN_ONCE
     start_within_s: float = 300.0
     overlap: Overlap = Overlap.SKIP
+    once: bool = False
     enabled: bool = True
     labels: dict[str, str] = field(default_factory=dict[str, str])
 
@@ -157,7 +158,8 @@ class Scheduler:
         run, outcome = self._started(schedule, planned, at)
         changed = replace(
             schedule,
-            next_at=next_start(schedule.cron, schedule.time_zone, at),
+            enabled=not schedule.once,
+            next_at=None if schedule.once else next_start(schedule.cron, schedule.time_zone, at),
             last_at=planned,
             last_run=schedule.last_run if run is None else run.id,
             last_outcome=outcome,

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -124,6 +125,10 @@ class SimulatedDriver:
         cables = self._register.cables
         faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}", cables)
         return self._asked(RegisteredBench(bench, link, cables, faults, bench.lost_links), job)
+
+    def warm_up(self) -> None:
+        """Load the filter of the unit's noise: half a second, of which the watchdog would see a table that hangs."""
+        import_module("scipy.signal")
 
     def world(
         self, unit: str, seed: int, needs: BenchNeeds, description: BenchDescription, clock: Clock

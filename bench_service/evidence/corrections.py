@@ -34,6 +34,16 @@ class StoredCorrection:
     """All decisions about it, oldest first; `calibration_id` of each is this correction's id."""
 
     @property
+    def by_rule(self) -> bool:
+        """Whether the rule made it current; False where a person chose it, and while it is not current."""
+        choices = [d for d in self.decisions if d.act in (Act.CHOSEN, Act.GIVEN_BACK)]
+        return self.current and (not choices or choices[-1].act is Act.GIVEN_BACK)
+
+    def gives_way(self, at: datetime) -> bool:
+        """Whether the rule may put another one in its place: a person's choice stands while it may be used."""
+        return self.by_rule or bool(self.unusable(at))
+
+    @property
     def why_not_current(self) -> str:
         """Reason why it is not its kind's current one, with the way out; empty where it is."""
         what = f"correction {self.id} of the kind {self.correction.kind!r}"
@@ -50,7 +60,10 @@ class StoredCorrection:
             )
         if not self.of_job:
             return f"{what} comes from a second analysis or a method: it counts only where a person chooses it"
-        return f"{what} was current until another one took its place; choose it to use it again"
+        return (
+            f"{what} is not the current one: a newer one of a job that passed took its place, or one that a person "
+            "chose stands; choose it to use it"
+        )
 
     def unusable(self, at: datetime) -> str:
         """Return the reason why it may not be used at a time, with the way out; empty where it may."""
@@ -94,6 +107,13 @@ class CorrectionStore(Protocol):
 
         A known key with the same fingerprint changes nothing. Raises `NotFound`, `IdempotencyConflict`, and
         `CorrectionRefused` for one of a result that did not pass where there is no remark.
+        """
+        ...
+
+    def choose_by_rule(self, unit: str, kind: CorrectionKind, by: Decider) -> StoredCorrection:
+        """Give a kind back to the rule: its newest usable correction by a job that passed becomes current.
+
+        Raises `CorrectionRefused` where there is none.
         """
         ...
 

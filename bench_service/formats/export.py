@@ -2,25 +2,42 @@
 
 Samples go out as they are stored, raw; scale, offset, unit and quantity of each channel, the rate and the content hash
 of the whole recording travel with them (not in NumPy's format, which has no place for them).
-``value = scale·(raw − offset)``. Must not know where the blocks come from.
+``value = scale·(raw − offset)``. Must not know where the blocks come from. Arrow is imported where something goes out.
 """
 
 import io
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from pyarrow import csv
 
-from bench_service.formats.chunk import RAW_BYTES, sample_type
-from bench_service.formats.export_format import ExportFormat
+from bench_service.formats.chunk import RAW_BYTES, arrow_array, sample_type
 from bench_service.formats.samples_out.written_bytes import WrittenBytes
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
+
+
+class ExportFormat(StrEnum):
+    """File format of an exported recording."""
+
+    ARROW = "arrow"
+    PARQUET = "parquet"
+    CSV = "csv"
+    NPY = "npy"
+
+    @property
+    def media_type(self) -> str:
+        """Return the format's media type for HTTP."""
+        return {
+            "arrow": "application/vnd.apache.arrow.stream",
+            "parquet": "application/vnd.apache.parquet",
+            "csv": "text/csv; charset=utf-8",
+            "npy": "application/octet-stream",
+        }[self.value]
+
 
 HELD = {ExportFormat.ARROW: 4, ExportFormat.PARQUET: 5, ExportFormat.CSV: 8, ExportFormat.NPY: 4}
 """Times a chunk's raw bytes that an export of it holds: as read, as columns, and as text or as a page of the file."""
@@ -59,6 +76,19 @@ def extract(
     if last < first:
         raise BadParameter("stop_s", stop_s, f"not before start_s = {start_s}")
     return Extract(replace(info, channels=chosen), first, last, dtype)
+
+
+def require_samples(part: Extract, start_s: float | None, stop_s: float | None) -> None:
+    """Refuse a stretch in which no sample begins. Raises `BadParameter` with the range of the recording."""
+    info, begin_s = part.info, start_s or 0.0
+    if part.start < part.stop or info.count == 0:
+        return
+    field, given, end_s = ("start_s", begin_s, info.duration_s) if stop_s is None else ("stop_s", stop_s, stop_s)
+    allowed = (
+        f"a stretch with samples: of {info.rate_hz:g} a second none begins within {begin_s:g} … {end_s:g} s; start_s "
+        f"and stop_s count from the first sample, 0 … {info.duration_s:g}"
+    )
+    raise BadParameter(field, given, allowed)
 
 
 def _sample(info: RecordingInfo, field: str, moment_s: float) -> int:
@@ -101,6 +131,8 @@ def describe(part: Extract) -> dict[str, str]:
 
 
 def _schema(part: Extract) -> Any:
+    import pyarrow as pa
+
     kind = pa.from_numpy_dtype(sample_type(part.dtype))
     fields = [
         pa.field(
@@ -120,12 +152,16 @@ def _schema(part: Extract) -> Any:
 
 
 def _batches(schema: Any, blocks: Iterable[RawArray]) -> Iterator[Any]:
+    import pyarrow as pa
+
     for block in blocks:
-        columns = [pa.array(np.ascontiguousarray(block[:, index])) for index in range(block.shape[1])]
+        columns = [arrow_array(block[:, index]) for index in range(block.shape[1])]
         yield pa.RecordBatch.from_arrays(columns, schema=schema)
 
 
 def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
+    import pyarrow as pa
+
     outbox, schema = WrittenBytes(), _schema(part)
     with pa.ipc.new_stream(pa.PythonFile(outbox, mode="w"), schema) as writer:
         for batch in _batches(schema, blocks):
@@ -135,6 +171,9 @@ def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
 
 
 def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     outbox, schema = WrittenBytes(), _schema(part)
     with pq.ParquetWriter(
         pa.PythonFile(outbox, mode="w"),
@@ -153,6 +192,9 @@ def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
 
 def _csv(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
     """Lines that begin with "#" describe; then names; then rows: time since the first sample [s], raw samples."""
+    import pyarrow as pa
+    from pyarrow import csv
+
     lines = [f"# {key}: {value}" for key, value in describe(part).items()]
     lines += [
         f"# channel {c.name}: quantity={c.quantity.value} unit={c.unit} scale={c.scale!r} offset={c.offset!r}"
@@ -164,7 +206,7 @@ def _csv(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
     sample = part.start
     for block in blocks:
         time_s = np.arange(sample, sample + len(block)) / part.info.rate_hz
-        columns = [pa.array(time_s), *(pa.array(np.ascontiguousarray(block[:, i])) for i in range(len(names)))]
+        columns = [arrow_array(time_s), *(arrow_array(block[:, i]) for i in range(len(names)))]
         sink = pa.BufferOutputStream()
         csv.write_csv(pa.Table.from_arrays(columns, names=["time_s", *names]), sink, options)
         yield sink.getvalue().to_pybytes()

@@ -5,13 +5,13 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
-from threading import Event
+from threading import Event, Lock
 
 from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import LiveBoard
-from bench_service.bench.make_safe import RoadEnd, over_new_link, whole_road
+from bench_service.bench.make_safe import Obstacle, RoadEnd, has_register, over_new_link, still_unsafe, whole_road
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.session import BenchSession
 from bench_service.evidence.catalogue import AnyProcedure
@@ -21,17 +21,21 @@ from bench_service.jobs.as_planned import require_as_planned
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.retries import try_again
+from bench_service.jobs.stop_queries import StopQueries
 from bench_service.jobs.stores import JobStores
 from bench_service.model.context import context_document, context_of
-from bench_service.model.errors import DatabaseMoved, ServiceError, StorageFailure
+from bench_service.model.errors import ServiceError
 from bench_service.model.job import Failure, Job, JobState
 from bench_service.model.records import BenchStop, Idempotency, StoredResult
-from bench_service.wall_clock import now
+from bench_service.wall_clock import monotonic_s, now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
 from procedures.core.errors import DomainError
 from procedures.core.limits import Verdict
 from procedures.procedure import Outcome
+
+AGAIN_S = 1.0
+"""Interval between two attempts at devices of a stopped bench that could not be made safe [s]."""
 
 log = logging.getLogger(__name__)
 
@@ -80,8 +84,12 @@ class JobRunner:
         self._live = live
         self._retry_scale = retry_scale
         self._stopped = stopped
+        self._queries = StopQueries(stores.benches, stores.jobs, driver.description.id, stopped)
         self._by = f"the service, {ProcessIdentity.own()}"
         self._session: BenchSession | None = None
+        self._road = Lock()
+        """Held while a thread makes the bench of a job safe, the guard's or the job's own; never for a database."""
+        self._again_s = 0.0
         self._ending = Event()
 
     def claim(self, entry: QueueEntry) -> Job | None:
@@ -112,7 +120,7 @@ class JobRunner:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
         job = jobs.get(job_id)
-        if job.cancel_requested or job.state is not JobState.RUNNING or self._stop_wanted(job_id):
+        if job.cancel_requested or job.state is not JobState.RUNNING or self._queries.wanted(job_id):
             return StepOutcome(cancelled=True)
         if job.pause_requested:
             return StepOutcome(paused=True)
@@ -128,7 +136,7 @@ class JobRunner:
                 raise ShuttingDown
             info = session.record(index)
         except Stopped:
-            moved = self._moved_database(job_id)
+            moved = self._queries.moved_database(job_id)
             return StepOutcome(cancelled=True) if moved is None else StepOutcome(replace(moved, station=index))
         except (BenchError, DomainError, ServiceError) as error:
             return StepOutcome(Failure(type(error).__name__, str(error), index))
@@ -146,16 +154,19 @@ class JobRunner:
         session = self._session
         if session is None or session.job.id != job_id:
             if self._driver.device_state() is not None:
-                obstacle = over_new_link(self._driver, self._by)
-                return StepOutcome() if obstacle is None else self._not_safe(job_id, obstacle.why)
+                with self._road:
+                    obstacle = over_new_link(self._driver, self._by)
+                return StepOutcome() if obstacle is None else self._not_safe(job_id, obstacle.reason)
             job = self._stores.jobs.get(job_id)
             try:
                 session = self._session_of(job)
             except (BenchError, ServiceError) as error:
-                return self._not_safe(job_id, str(error))
+                return self._not_safe(job_id, Obstacle((str(error),)).reason)
         end = self._whole_road(session)
-        if end.obstacle is not None:
-            return self._not_safe(job_id, end.obstacle.why)
+        with self._road:
+            unsafe = still_unsafe(self._driver, self._by, "the job") if end.obstacle is None else end.obstacle.reason
+        if unsafe is not None:
+            return self._not_safe(job_id, unsafe)
         if end.detour:
             text = f"the bench was made safe over a new link: {end.detour}"
             self._stores.jobs.note(job_id, "note", now(), {"text": text})
@@ -169,7 +180,7 @@ class JobRunner:
         if session is None:
             return
         session.stop()
-        if self._driver.device_state() is None:  # a bench without a register: its one link is the session's
+        if not has_register(self._driver):  # a bench without a register: its one link is the session's
             return
         end = self._whole_road(session)
         if end.obstacle is not None:
@@ -180,7 +191,23 @@ class JobRunner:
             if self._session is session:
                 self._session = None
 
-        return whole_road(session, self._driver, self._by, given_back)
+        with self._road:
+            return whole_road(session, self._driver, self._by, given_back)
+
+    def try_again(self) -> None:
+        """Make devices safe over a new link that an earlier attempt has given up, once in `AGAIN_S`.
+
+        For a stopped bench without a supervisor: nobody else tries before a person releases it.
+        """
+        with self._road:
+            state = self._driver.device_state()
+            if self._session is not None or state is None or state.safe or state.linked:
+                return
+            if monotonic_s() >= self._again_s:
+                obstacle = over_new_link(self._driver, self._by)
+                self._again_s = monotonic_s() + AGAIN_S
+                if obstacle is not None and not obstacle.busy:
+                    log.warning("the stopped bench %s is not safe yet: %s", self._driver.description.id, obstacle)
 
     def conclude(self, job_id: str) -> StepOutcome:
         """Analyse the recordings, store the result and its calibrations, and end the job with the verdict; may be
@@ -249,39 +276,12 @@ class JobRunner:
         if found != unit:
             self._stores.units.put_unit(found)
 
-    def _not_safe(self, job_id: str, why: str) -> StepOutcome:
-        text = f"the bench could not be made safe: {why}"
-        by, reason = f"the worker, {ProcessIdentity.own()}", f"could not be made safe: {why}"
+    def _not_safe(self, job_id: str, reason: str) -> StepOutcome:
+        """Stop the bench, for a reason whose subject is the bench."""
+        text, by = f"the bench {reason}", f"the worker, {ProcessIdentity.own()}"
         self._stores.benches.stop_bench_once(BenchStop(self._driver.description.id, now(), reason, by=by))
         self._stores.jobs.note(job_id, "note", now(), {"text": text})
         return StepOutcome(Failure("NotSafe", text))
-
-    def _stop_wanted(self, job_id: str) -> bool:
-        """Return whether the job was cancelled or its bench stopped, through any process.
-
-        A database that does not answer now, because it is restarted, counts as no stop: the recording continues. A stop
-        on the bench's own host does not depend on it. One whose file was deleted or replaced takes no recording any
-        more: the job is stopped.
-        """
-        if self._stopped():
-            return True
-        try:
-            bench_stop = self._stores.benches.bench_stop(self._driver.description.id)
-            return bench_stop is not None or self._stores.jobs.cancel_requested(job_id)
-        except DatabaseMoved:
-            return True
-        except StorageFailure:
-            return False
-
-    def _moved_database(self, job_id: str) -> Failure | None:
-        """The failure of a job whose database's file was deleted or replaced; None where it was not."""
-        try:
-            self._stores.jobs.cancel_requested(job_id)
-        except DatabaseMoved as moved:
-            return Failure(type(moved).__name__, str(moved))
-        except StorageFailure:
-            return None
-        return None
 
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:
@@ -295,6 +295,6 @@ class JobRunner:
         if self._spread is not None and bench.description.origin == "simulated":  # a real one takes its hours
             self._spread.begin_for(job.stations, bench.imu)
         live = None if self._live is None else LiveTap(job, bench, self._live)
-        stop_wanted = partial(self._stop_wanted, job.id)
+        stop_wanted = partial(self._queries.wanted, job.id)
         self._session = BenchSession(job, procedure, bench, self._stores.recordings, stop_wanted, live, self._stopped)
         return self._session

@@ -1,17 +1,21 @@
 """Idempotency keys of stop requests, in the memory of this process: a stop may not wait for a database to look one up.
 
 A stop that is sent again with its key, after a time-out or a broken connection, is the same stop. A key that comes with
-another body is a stop of its own: no stop is ever refused for its key.
+another body, or long afterwards, is a stop of its own: a program whose button has one key for ever would be answered
+that the bench is stopped, after its release, and nothing would stop. No stop is ever refused for its key.
 """
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from threading import Lock
 
 from bench_service.bench.stop.word import StopWord
+from bench_service.wall_clock import monotonic_s
 
 MOST = 1000
 """Number of keys that are remembered, the latest ones."""
+KEPT_S = 600.0
+"""Time for which a key is remembered [s]: a client tries again within minutes."""
 
 
 @dataclass
@@ -20,6 +24,8 @@ class KeyedStop:
 
     word: StopWord
     answered: bool = False
+    at_s: float = field(default_factory=lambda: monotonic_s())
+    """Time of the first request, by the monotonic clock [s]."""
 
 
 class StopKeys:
@@ -36,7 +42,8 @@ class StopKeys:
             return new
         with self._mutex:
             known = self._known.get((bench_id, key))
-            if known is not None and (known.word.reason, known.word.by) == (word.reason, word.by):
+            same = known is not None and (known.word.reason, known.word.by) == (word.reason, word.by)
+            if known is not None and same and new.at_s - known.at_s < KEPT_S:
                 return known
             self._known[bench_id, key] = new
             while len(self._known) > MOST:

@@ -22,10 +22,12 @@ class Approval(StrEnum):
 
 
 class Act(StrEnum):
-    """Kind of decision of a person about a calibration."""
+    """Kind of decision of a person about a calibration or a correction."""
 
     ENTERED = "entered"
     CHOSEN = "chosen"
+    GIVEN_BACK = "given back"
+    """A person gave the kind of a correction back to the rule, which made this one current."""
     APPROVED = "approved"
     REJECTED = "rejected"
 

@@ -16,6 +16,8 @@ class Quantity:
     value: float
     unit: str
     standard_uncertainty: float | None = None
+    bound: bool = False
+    """True: nothing was observed, and the value is what it stays below."""
 
 
 def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
@@ -24,7 +26,11 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     """
     found = {
         check["name"]: Quantity(
-            check["name"], check["value"], check["limit"]["unit"], check.get("standard_uncertainty")
+            check["name"],
+            check["value"],
+            check["limit"]["unit"],
+            check.get("standard_uncertainty"),
+            check.get("bound", False),
         )
         for check in document.get("checks", [])
     }

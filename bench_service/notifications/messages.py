@@ -59,7 +59,7 @@ def of_run(run: CampaignRun, at: datetime) -> Message | None:
         return None
     outcome = run.state.value if run.verdict is None else run.verdict.value
     missed = [
-        f"{step.name}: {check.name} = {check.value:.6g} {check.limit.unit}"
+        f"{step.name}: {check.name} = {check.value:.6g} {check.limit.unit}{' (inconclusive)' * check.inconclusive}"
         for step in run.steps
         for check in step.checks
         if not check.passed

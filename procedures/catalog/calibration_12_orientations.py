@@ -14,7 +14,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.estimator import Weighting
-from procedures.analysis.calibration.plan import TriadPlan, basis, triad_plan
+from procedures.analysis.calibration.plan import TriadPlan, basis, in_sample_covariance, triad_plan
 from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.analysis.calibration.reference_temperature import ThermalShare, least_dwell_s, require_correctable
 from procedures.analysis.calibration.scalar import require_scalar_determined
@@ -215,7 +215,8 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
     maxima = {"gyro": limits.gyro_bias_in_run_deg_h, "accelerometer": limits.accelerometer_bias_in_run_m_s2}
     level = limits.residual_p_value_min
     name, limit = "residuals, p-value of chi-square", Limit("1", minimum=level, source="ours: a test of significance")
-    found = [in_run_check(_plan(triad, params, context), maxima[triad]) for triad in TRIAD_NAMES]
+    plans = {triad: _plan(triad, params, context) for triad in TRIAD_NAMES}
+    found = [in_run_check(plan, maxima[triad], in_sample_covariance(plan)) for triad, plan in plans.items()]
     return (*found, *(PlannedCheck(f"{triad} {name}", limit, level=level) for triad in TRIAD_NAMES))
 
 
@@ -266,8 +267,10 @@ def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
     found = [unresolved(by_triad[r.triad], r) for r in wanted]
     deg_h = units.DEG_PER_HOUR
     found += [
-        in_run_unresolved(by_triad["gyro"], limits.gyro_bias_in_run_deg_h * deg_h, "deg/h", deg_h),
-        in_run_unresolved(by_triad["accelerometer"], limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0),
+        in_run_unresolved(by_triad["gyro"], limits.gyro_bias_in_run_deg_h * deg_h, "deg/h", deg_h, in_sample=True),
+        in_run_unresolved(
+            by_triad["accelerometer"], limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0, in_sample=True
+        ),
     ]
     unknown = [
         f"the noise of the {p.triad} triad is not known: its uncertainties come from the scatter within the dwells and "

@@ -36,7 +36,12 @@ from procedures.analysis.calibration.triad_verification import (
     verify_triad,
 )
 from procedures.analysis.calibration.verification import predicted_sd
-from procedures.analysis.orientation_plan.requirements import IN_RUN_LEVEL, in_run_check, in_run_unresolved
+from procedures.analysis.orientation_plan.requirements import (
+    IN_RUN_LEVEL,
+    chance_of_failure,
+    in_run_check,
+    in_run_unresolved,
+)
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -103,18 +108,14 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Return the parameters with the dwell from the unit, site and table from the bench. Raises `BadParameter` for a
-    correction that the unit does not have.
-    """
+    """Return the parameters with dwell, site and table. Raises `BadParameter` for a correction that is missing."""
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
     return full.with_rule(context.unit, least_dwell_s(full.thermal_correction))
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Return the stations of the verification, one an orientation, in the order given. Raises `BadParameter` where the
-    dwell is not resolved.
-    """
+    """Return the stations, one an orientation, in order. Raises `BadParameter` where the dwell is not resolved."""
     if params.dwell_s is None:
         raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
     return tuple(
@@ -133,17 +134,13 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Return duration, the standard deviations of the magnitudes and of each coefficient's change since the
-    calibration.
-
-    Raises `NoCalibration`.
-    """
+    """Return duration, and standard deviations of the magnitudes and of each change. Raises `NoCalibration`."""
     params = resolve(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     uncertainties = tuple(u for plan in plans for u in (*_predicted(plan), *_predicted_changes(plan, params, context)))
     stations = schedule(params)
     duration_s = float(windows(expected_stations(stations), context.bench.axis_motion)[-1, 1])
-    warnings = _warnings(plans, params.limits) + params.dwell_warnings(stations)
+    warnings = _warnings(plans, params.limits) + _chances(plans, params.limits) + params.dwell_warnings(stations)
     return Prediction(duration_s, uncertainties, warnings, basis(plans) if uncertainties else "")
 
 
@@ -154,9 +151,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Return the comparison of the corrected station means of both triads with gravity and the Earth's rate, by
-    magnitude. Raises `NoCalibration`, `UnfitRecording`.
-    """
+    """Return the corrected means' magnitudes, judged. Raises `NoCalibration`, `UnfitRecording`."""
     params = resolve(params, context)
     site = params.site(context)
     used = context.unit.thermal_correction if params.thermal_correction == "current" else None
@@ -195,9 +190,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
 
 
 def report(result: Result) -> Report:
-    """Return the report: checks, and out of sample what Tables 5.3, 5.4 and figures 5.6-5.12 of the thesis show in
-    sample.
-    """
+    """Return the report: checks, and out of sample what Tables 5.3, 5.4 and figures 5.6-5.12 show in sample."""
     magnitudes = [t.magnitudes for t in result.triads]
     figures = [figure for m in magnitudes for figure in pictures.magnitude_figures(m)]
     table = pictures.magnitude_table(magnitudes, "Verification, out of sample: other orientations and another launch")
@@ -266,6 +259,13 @@ def _warnings(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
                 "only for the launch of the calibration"
             )
     return tuple(found)
+
+
+def _chances(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
+    """Sentences on limits that a sound unit may well exceed; one that the plan makes has its level."""
+    declared = (limits.gyro_bias_in_run_deg_h, limits.accelerometer_bias_in_run_m_s2)
+    found = [chance_of_failure(_in_run(p, limits)) for p, own in zip(plans, declared, strict=True) if own is not None]
+    return tuple(w for w in found if w is not None)
 
 
 def _in_run(plan: TriadPlan, limits: Limits) -> PlannedCheck:

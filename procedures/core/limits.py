@@ -2,7 +2,8 @@
 
 ``U = k·u`` is the expanded uncertainty, k Student's factor of the value's degrees of freedom. Simple acceptance passes
 a value at its limit; guarded acceptance wants it inside by the guard band ``w = r·U``. A pass or a fail is conditional
-where the value lies within U of the limit (ISO/IEC 17025, 7.8.6; ILAC-G8).
+where the value lies within U of the limit (ISO/IEC 17025, 7.8.6; ILAC-G8). A value that is only an upper bound of what
+was not observed passes inside its limit; outside it is inconclusive: what it bounds may be on either side.
 """
 
 from collections.abc import Iterable
@@ -12,7 +13,8 @@ from math import inf, isfinite
 from typing import Literal
 
 RuleName = Literal["simple", "guarded"]
-OutcomeName = Literal["pass", "conditional pass", "conditional fail", "fail"]
+OutcomeName = Literal["pass", "conditional pass", "conditional fail", "fail", "inconclusive"]
+BOUND_RULE = "an upper bound of what was not observed: it passes within the limit, and decides nothing outside"
 COVERAGE = 0.9545
 """Coverage probability without another wish: k = 2 of a normal distribution."""
 
@@ -156,6 +158,13 @@ class Check:
     """Rule by which it was decided, and the expanded uncertainty; None in results of versions before it."""
     significance: bool = False
     """True for a test of significance: the value is a p-value and the limit its level."""
+    bound: bool = False
+    """True: nothing was observed, and the value is what it stays below."""
+
+    @property
+    def inconclusive(self) -> bool:
+        """True for an upper bound outside its limit: no pass, and no evidence of a fail."""
+        return self.bound and not self.passed
 
 
 @dataclass(frozen=True)
@@ -186,14 +195,18 @@ def check(
     standard_uncertainty: float | None = None,
     note: str = "",
     degrees_of_freedom: float | None = None,
+    bound: bool = False,
 ) -> Check:
-    """Return the check of a value against its limit by simple acceptance. A value that is not finite never passes."""
+    """Return the check of a value against its limit by simple acceptance. A value that is not finite never passes.
+
+    `bound`: nothing was observed, and the value is what it stays below.
+    """
     passed = (
         isfinite(value)
         and (limit.maximum is None or value <= limit.maximum)
         and (limit.minimum is None or value >= limit.minimum)
     )
-    return Check(name, value, limit, passed, standard_uncertainty, note, degrees_of_freedom)
+    return Check(name, value, limit, passed, standard_uncertainty, note, degrees_of_freedom, bound=bound)
 
 
 def significance(name: str, p_value: float, level: float, note: str = "", source: str = "") -> Check:
@@ -206,6 +219,8 @@ def significance(name: str, p_value: float, level: float, note: str = "", source
 
 def decided(made: Check, rule: Rule) -> Check:
     """Return the check under a decision rule, which can make a pass a fail, never the reverse."""
+    if made.bound:
+        return replace(made, decision=Decision(BOUND_RULE, "pass" if made.passed else "inconclusive"))
     if made.significance:
         outcome = "pass" if made.passed else "fail"
         return replace(made, decision=Decision(f"test of significance at {made.limit.minimum or 0.0:g}", outcome))
@@ -215,10 +230,10 @@ def decided(made: Check, rule: Rule) -> Check:
 
 
 def verdict(checks: Iterable[Check]) -> Verdict:
-    """Return the verdict over all checks: pass where every check passed; no check at all is an error: nothing was
-    judged.
+    """Return the verdict over all checks: pass where every one passed, fail where one failed, else error: a check is
+    inconclusive, or there is none.
     """
-    outcomes = [c.passed for c in checks]
-    if not outcomes:
-        return Verdict.ERROR
-    return Verdict.PASS if all(outcomes) else Verdict.FAIL
+    made = tuple(checks)
+    if any(not c.passed and not c.inconclusive for c in made):
+        return Verdict.FAIL
+    return Verdict.PASS if made and all(c.passed for c in made) else Verdict.ERROR

@@ -2,6 +2,7 @@
 
 import json
 import re
+from datetime import timedelta
 from pathlib import Path
 from urllib.parse import urlencode
 
@@ -11,6 +12,7 @@ from playwright.sync_api import Route, expect
 from bench_service.formats.certificate.document import certificate
 from bench_service.formats.certificate.laboratory import laboratory_of
 from bench_service.formats.certificate.signature import new_key, signed
+from bench_service.wall_clock import now
 from tests.browser.conftest import Watched
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.certificate_facts import TEXT
@@ -42,7 +44,14 @@ def test_a_file_is_imported_after_what_it_does_not_say_was_answered(window: Watc
     expect(go).to_be_disabled()
     page.locator("#import-unit").fill("PAPER-1")
     page.locator("#import-rate").fill("100")
+    doubt = page.locator("#import-doubts label").filter(has=page.get_by_text(re.compile("taken as rad/s")))
+    doubt.locator("input").check()
     page.get_by_label("Unit gyro_x").select_option("deg/s")
+    expect(page.get_by_label("Unit gyro_y")).to_have_value("deg/s")  # of one triad
+    told = page.locator("#import-doubts label").filter(has_text="You chose the units: gyro_x deg/s, gyro_y deg/s")
+    expect(told.locator("input")).not_to_be_checked()
+    page.get_by_label("Unit gyro_y").select_option("deg/h")
+    expect(page.get_by_label("Unit gyro_x")).to_have_value("deg/s")  # given by hand
     page.get_by_role("checkbox", name="Import gyro_y").uncheck()
     for box in page.locator("#import-doubts input").all():
         box.check()
@@ -125,6 +134,21 @@ def test_a_campaign_is_made_started_and_scheduled_by_forms(window: Watched, serv
     expect(page.locator("#schedules")).to_contain_text("30 22 * * 1-5")
     page.locator("#schedules").get_by_role("button", name="Switch off").click()
     expect(page.locator("#schedules").get_by_role("button", name="Switch on")).to_be_visible()
+    page.locator('td[data-campaign="short"]').get_by_role("button", name="Schedule").click()
+    page.locator("#campaign").get_by_label("How often").select_option(label="once")
+    page.locator("#campaign").get_by_label("Start at", exact=True).fill("2020-01-01T22:30")
+    page.locator("#campaign").get_by_role("button", name="Schedule").click()
+    expect(page.locator("#campaign output")).to_contain_text("This time has passed")
+    tomorrow = (now() + timedelta(days=1)).strftime("%Y-%m-%dT22:30")
+    page.locator("#campaign").get_by_label("Start at", exact=True).fill(tomorrow)
+    page.locator("#campaign").get_by_role("button", name="Schedule").click()
+    expect(page.locator("#schedules tbody tr")).to_have_count(2)
+    once = service.client.get("/api/v1/schedules").json()["items"][0]
+    assert (once["once"], once["campaign"], once["next_at"][11:16]) == (
+        True,
+        "short",
+        "22:30",
+    )
     page.locator('td[data-campaign="short"]').get_by_role("button", name="Start").click()
     page.get_by_role("button", name="Start the campaign").click()
     page.wait_for_url(re.compile("/campaign-runs/"))

@@ -219,6 +219,7 @@ def test_a_prompt_is_on_every_page_and_a_stale_answer_is_refused(window: Watched
     for page in (home, other):
         expect(page.locator(".prompt")).to_be_visible(timeout=20_000)
         expect(page).to_have_title(re.compile("To be done"))
+    expect(home.locator("form.stop .status")).to_contain_text("waits for a person")
     old = job_of(service, job)["prompt"]["id"]
     home.locator(".prompt").get_by_label("Remark").fill("x axis up")
     home.locator(".prompt").get_by_role("button", name="Done", exact=True).click()

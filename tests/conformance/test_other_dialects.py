@@ -4,7 +4,7 @@ Every driver of a device that is asked, at every other served device and at serv
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import pytest
 
 from procedures.bench.errors import BenchError
 from procedures.core.table_angles import TableAngles
+from simulators.served.bench import ServedBench
 from tests.conformance.served import CHAMBER_LIMITS, SUPPLY_LIMITS, axis, opened, served
 
 AXES = {"outer": axis(1, 360.0, continuous=True), "middle": axis(2, 190.0), "inner": axis(3, 400.0)}
@@ -56,7 +57,7 @@ class _Heard:
 
 
 @asynccontextmanager
-async def _others() -> AsyncIterator[dict[str, tuple[int, _Heard]]]:
+async def _others() -> AsyncGenerator[dict[str, tuple[int, _Heard]]]:
     texts = {name: (text, b"") for name, text in GREETINGS.items()} | {name: (b"", t) for name, t in ANSWERS.items()}
     found, servers = dict[str, tuple[int, _Heard]](), list[asyncio.Server]()
     for name, (greeting, answer) in texts.items():
@@ -73,7 +74,7 @@ async def _others() -> AsyncIterator[dict[str, tuple[int, _Heard]]]:
 async def _refusal(driver: str, port: int, folder: Path) -> str:
     """Return what the demand ends with. It must end in the words of a bench's error, within its deadline."""
     kind, section, demand = DRIVERS[driver]
-    device = opened(kind, driver, port, folder, answer_s=0.3, connect_s=1.0, **dict(section.items()))
+    device = opened(kind, driver, port, folder, answer_s=0.3, connect_s=1.0, **section)
     try:
         async with asyncio.timeout(6.0):
             await demand(device)
@@ -110,4 +111,9 @@ def test_other_devices_of_the_bench_are_told_and_change_nothing(tmp_path: Path, 
         for name, refusal in zip(others, asyncio.run(scene(behind.numbers)), strict=True):
             assert f"127.0.0.1:{behind.numbers[name]}" in refusal, f"{name}: {refusal}"
         assert behind.do(lambda bench: (bench.table.encoders_deg(), bench.bench.supply.is_on())) == before
-        assert behind.do(lambda bench: bench.bench.chamber.plant.state.target_c) is None
+        assert behind.do(_target) is None
+
+
+def _target(bench: ServedBench) -> float | None:
+    assert bench.bench.chamber is not None
+    return bench.bench.chamber.plant.state.target_c

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from procedures import catalog
+from procedures.analysis.calibration.multiposition import fit_triad
+from procedures.analysis.calibration.plan import TriadPlan, triad_plan
+from procedures.analysis.calibration.verification import magnitudes
 from procedures.core import units
 from procedures.core.imu_model import triad_calibration
 from procedures.core.unit import Unit
@@ -73,6 +76,36 @@ def test_a_limit_that_a_longer_dwell_reaches_is_told_with_the_dwell(context: Con
     hours = float(warning.split("about ")[1].split(" h")[0])
     params = CALIBRATION.params(limits=limits, dwell_s=hours * 3600 * 1.05)
     assert CALIBRATION.predict(params, context).warnings == ()
+
+
+@pytest.mark.parametrize("triad", ["gyro", "accelerometer"])
+def test_the_bias_in_run_of_a_calibration_is_foreseen_in_sample(context: Context, triad: str):
+    """The mean of δ² over 120 calibrations of 12 orientations by the foreseen δ² is χ²/(120·ν), within 4.5 σ.
+
+    A calibration follows its own outputs: the noise of the dwells alone, without the fit, is half as much again.
+    """
+    params = CALIBRATION.resolve(CALIBRATION.params(), context)
+    site, stations = params.site(context), CALIBRATION.schedule(params)
+    plan = triad_plan(triad, context.unit, stations, context.bench.axis_motion, site, params.table(site))
+    planned = {c.check: c for c in CALIBRATION.planned_checks(params, context)}[f"{triad} bias in run, δ/√3"]
+    dice, draws = np.random.default_rng(6), 120
+    squares = np.array([in_run(plan, dice) for _ in range(draws)]) ** 2
+    assert planned.standard_uncertainty is not None
+    assert planned.degrees_of_freedom is not None
+    foreseen = planned.standard_uncertainty * units.DISPLAY[{"gyro": "rad/s", "accelerometer": "m/s^2"}[triad]][1]
+    assert abs(squares.mean() / foreseen**2 - 1.0) < 4.5 * np.sqrt(2.0 / (draws * planned.degrees_of_freedom))
+
+
+def in_run(plan: TriadPlan, dice: np.random.Generator) -> float:
+    """δ/√3 of one calibration whose noise and table are drawn from the plan's, with K the identity and no bias."""
+    noise = plan.noise_covariance()
+    assert noise is not None
+    turned = plan.vectors + plan.table.sensitivity @ (plan.table.sd * dice.normal(size=len(plan.table.sd)))
+    drawn = np.array([np.linalg.cholesky(c) @ dice.normal(size=len(turned)) for c in noise]).T
+    unit = {"gyro": "rad/s", "accelerometer": "m/s^2"}[plan.triad]
+    fit = fit_triad(plan.triad, unit, unit, plan.vectors, turned + drawn, noise, plan.table)
+    reference = float(np.linalg.norm(plan.vectors[0]))
+    return magnitudes(turned + drawn, fit.calibration(), reference, [""] * len(turned)).per_axis
 
 
 def test_an_in_run_limit_beneath_the_noise_of_the_dwell_is_told(context: Context):

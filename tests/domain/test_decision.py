@@ -120,6 +120,35 @@ def test_a_rule_for_no_check_is_refused_or_said() -> None:
     assert "'nothing' was not used" in found.warnings[-1]
 
 
+@pytest.mark.parametrize("rule", ["simple", "guarded"])
+def test_an_upper_bound_outside_its_limit_decides_nothing(rule: str) -> None:
+    """Its quantity may lie on either side of the limit: no pass, and no evidence of a fail."""
+    limit = Limit("1", maximum=1.0)
+    above, below = check("above", 1.2, limit, bound=True), check("below", 0.8, limit, bound=True)
+    good, bad = check("good", 0.5, limit, 0.01), check("bad", 1.5, limit, 0.01)
+    found = judged(outcome(above, below, good), rules(rule=rule))
+    assert [c.decision and c.decision.outcome for c in found.checks] == ["inconclusive", "pass", "pass"]
+    assert [c.inconclusive for c in found.checks] == [True, False, False]
+    assert found.verdict is Verdict.ERROR
+    assert found.statement is not None
+    assert found.statement.outcome == "inconclusive"
+    assert "decides nothing" in found.statement.rule
+    failed = judged(outcome(above, bad), rules(rule=rule))
+    assert (failed.verdict, failed.statement and failed.statement.outcome) == (Verdict.FAIL, "fail")
+    assert judged(outcome(below, good), rules(rule=rule)).verdict is Verdict.PASS
+
+
+def test_a_guard_band_makes_an_undecided_result_a_failed_one() -> None:
+    near, above = (
+        check("near", 0.95, Limit("1", maximum=1.0), 0.1),
+        check("b", 2.0, Limit("1", maximum=1.0), bound=True),
+    )
+    assert judged(outcome(near, above), rules()).verdict is Verdict.ERROR
+    assert judged(outcome(near, above), rules(rule="guarded")).verdict is Verdict.FAIL
+    own = Outcome(checks=(near,), verdict=Verdict.ERROR)  # an error for another reason stays one
+    assert judged(own, rules()).verdict is Verdict.ERROR
+
+
 def test_a_value_that_is_no_number_never_passes() -> None:
     assert not decided(check("x", float("nan"), Limit("1", maximum=1.0), 0.1), Rule()).passed
 

@@ -14,8 +14,9 @@ from procedures.core.errors import BadParameter
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import GYRO, Channel, MemoryRecording, Quantity, RecordingInfo
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import NoiseLimits, NoiseParameters, NoiseResult, analyse_launches
+from procedures.launches import NoiseParameters, NoiseResult, analyse_launches
 from procedures.methods import allan_deviation
+from procedures.noise_limits import NoiseLimits
 from procedures.procedure import Evidence
 from procedures.reports.density import density_figure
 from procedures.reports.launch import noise_report

@@ -13,7 +13,9 @@ from procedures.analysis.calibration.verification import (
     predicted_sd,
 )
 from procedures.analysis.least_squares.chi_square import chi_square, tail_probability
+from procedures.analysis.orientation_plan.requirements import chance_of_failure, sound_unit_fails
 from procedures.core.imu_model import triad_calibration
+from procedures.core.limits import Limit, PlannedCheck
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord
 from tests.kit.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE
@@ -88,3 +90,22 @@ def test_the_expanded_uncertainty_of_a_root_mean_square_over_few_changes():
     assert np.mean(squares > chdtri(freedom, level) / freedom) == pytest.approx(level, rel=0.2)
     assert np.mean(squares > 4.0) > 1.5 * level, "k = 2 would refuse more than that"
     assert effective_freedom(np.eye(9)) == pytest.approx(8.0)
+
+
+def test_the_chance_that_a_sound_unit_fails_is_that_of_draws():
+    """20 000 draws find a chance of 0.1 to ± 0.002; the two moments leave it within a percentage point."""
+    rng, n = np.random.default_rng(6), 20_000
+    few = rng.normal(size=(9, 2))
+    covariance = few @ few.T + 0.01 * np.eye(9)
+    drawn = (rng.normal(size=(n, 2)) @ few.T + 0.1 * rng.normal(size=(n, 9))).std(axis=1, ddof=1) / np.sqrt(3.0)
+    u, freedom = predicted_sd(covariance) / np.sqrt(3.0), effective_freedom(covariance)
+    for quantile in (0.5, 0.9, 0.98):
+        limit = Limit("m/s^2", maximum=float(np.quantile(drawn, quantile)))
+        planned = PlannedCheck("δ/√3", limit, u, freedom, 0.0)
+        chance = sound_unit_fails(planned)
+        assert chance == pytest.approx(1.0 - quantile, abs=0.03 if quantile == 0.5 else 0.014)
+        warned = chance_of_failure(planned)
+        assert warned is not None
+        assert f"{100.0 * chance:.2g} %" in warned
+    assert chance_of_failure(PlannedCheck("δ/√3", Limit("1", maximum=10.0 * u), u, freedom)) is None
+    assert sound_unit_fails(PlannedCheck("δ/√3", Limit("1", maximum=1.0))) is None

@@ -85,7 +85,7 @@ def test_campaigns_are_added_listed_and_shown(bench: Command, added: dict[str, D
     assert "campaign good, 0.0 h of bench time" in added["good"].out
     assert "there is no procedure centrifuge yet" in added["hollow"].out, "what may not work is warned of"
     listed = bench("campaign", "list", "--json").json()
-    assert {"acceptance", "thesis_acceptance", *CAMPAIGNS} == {item["name"] for item in listed}
+    assert {"acceptance", "calibrate_verify", "thesis_acceptance", *CAMPAIGNS} == {item["name"] for item in listed}
     table = bench("campaign", "list")
     assert (table.code, table.err) == (0, "")
     assert "Nothing [much]" in table.out

@@ -138,7 +138,7 @@ def test_a_file_is_imported_and_analysed(bench_here: Command, tmp_path: Path) ->
     ]
     description = tmp_path / "poses.json"
     description.write_text(json.dumps({"unit": "HAND-1", "rate_hz": 50.0, "channels": channels}))
-    imported = bench_here("import", tmp_path / "poses.csv", "--description", description)
+    imported = bench_here("import", tmp_path / "poses.csv", "--description", description, "--json")
     assert imported.code == 0, imported.err
     recording = imported.json()["id"]
     arguments = ("analyse", "scalar_calibration", "--recording", recording)

@@ -125,6 +125,13 @@ def test_a_bench_that_is_served_is_driven_by_the_same_file(tmp_path: Path) -> No
     )
 
 
+def test_the_person_at_an_operators_address_is_served(tmp_path: Path) -> None:
+    path = _bench_file(tmp_path)
+    path.write_text(f'{path.read_text()}\n[operator]\naddress = "tcp://127.0.0.1:7040"\n')
+    device = served_bench(read_bench_file(path)).config.devices["operator"]
+    assert (device.language, device.host, device.port) == ("person", "127.0.0.1", 7040)
+
+
 def test_what_cannot_be_served_is_named(tmp_path: Path) -> None:
     path = _bench_file(tmp_path)
     plan = tmp_path / "plan.toml"

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
@@ -29,9 +29,12 @@ def message(store: Any, row: int, frame: str = "imu_link") -> Any:
     return types[IMU](stamped, attitude, zeros, vector(*RATES[row]), zeros + 5, vector(*FORCES[row]), zeros + 7)
 
 
-def bag2(folder: Path, plugin: StoragePlugin, frames: Any = None) -> bytes:
-    """Write a ROS 2 bag; `frames`: row -> frame_id."""
-    with Writer2(folder, version=9, storage_plugin=plugin) as writer:
+def bag2(folder: Path, plugin: StoragePlugin, frames: Any = None, packed: CompressionMode | None = None) -> bytes:
+    """Write a ROS 2 bag; `frames`: row -> frame_id; `packed`: by zstd, each message or the storage."""
+    writer = Writer2(folder, version=9, storage_plugin=plugin)
+    if packed is not None:
+        writer.set_compression(packed, CompressionFormat.ZSTD)
+    with writer:
         other = writer.add_connection("/temperature", "sensor_msgs/msg/Temperature", typestore=ROS2)
         imu = writer.add_connection("/imu/data", IMU, typestore=ROS2)
         for row in range(ROWS):

@@ -5,11 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from bench_service.formats.errors import UnreadableFile
+from bench_service.formats.logs.ros.batches import Batches
+from bench_service.formats.logs.ros.messages import Decoder, Topic
 from tests.formats.reading import RATES, TIMES_NS, proposed, read, require_motion
-from tests.formats.ros_files import LATE_NS, bag1, bag2
+from tests.formats.ros_files import IMU, LATE_NS, bag1, bag2
 
 PACKED1 = (None, Writer1.CompressionFormat.BZ2, Writer1.CompressionFormat.LZ4)
 
@@ -44,6 +46,14 @@ def test_a_database(database: bytes) -> None:
 def test_a_bag_of_ros_1(tmp_path: Path, packed: Writer1.CompressionFormat | None) -> None:
     proposal, _ = require_motion(bag1(tmp_path / "one.bag", packed), 0.0)
     assert proposal.format == "rosbag1"
+
+
+@pytest.mark.parametrize(
+    ("plugin", "mode"),
+    [(StoragePlugin.SQLITE3, CompressionMode.MESSAGE), (StoragePlugin.MCAP, CompressionMode.STORAGE)],
+)
+def test_a_bag_of_ros_2_that_is_packed(tmp_path: Path, plugin: StoragePlugin, mode: CompressionMode) -> None:
+    require_motion(bag2(tmp_path / "bag", plugin, packed=mode), 0.0)
 
 
 def test_stamps_are_those_of_sender_and_recorder(mcap: bytes, database: bytes) -> None:
@@ -124,3 +134,11 @@ def _other_database(path: Path) -> bytes:
         database.execute("CREATE TABLE things (name TEXT)")
     database.close()
     return path.read_bytes()
+
+
+def test_messages_that_wait_keep_no_chunk_alive() -> None:
+    """A chunk with images is a thousand times its message of an IMU; a buffer that is seen cannot be resized."""
+    chunk = bytearray(1_000_000)
+    batches = Batches(Decoder(Topic("/imu", IMU, None, cdr=True), [], "a"))
+    assert list(batches.add(memoryview(chunk)[:324], 0)) == []
+    chunk.clear()

@@ -171,7 +171,9 @@ def _oxts(folder: str) -> dict[str, str]:
 def test_a_drive_packed_from_inside_and_two_drives_in_one_archive() -> None:
     require_motion(_zip(_oxts("")), 0.0)
     both = _zip({**_oxts("a/oxts/"), **_oxts("b/oxts/")})
-    assert [t.name for t in proposed(both).tables] == ["a/oxts/", "b/oxts/"]
+    found = proposed(both)
+    assert [t.name for t in found.tables] == ["a/oxts/", "b/oxts/"]
+    assert any("are also in b/oxts/: give table" in words for words in found.notes)
     require_motion(both, 0.0, table="b/oxts/")
 
 

@@ -232,12 +232,14 @@ def test_corrections_are_listed_and_decided(bench: Bench, address: str) -> None:
         ("chosen", "Ann", "the passport's")
     ]
     assert bench("correction", "approve", "SIM-0001", old["id"], "--valid-until", "2099-01-01T00:00:00Z").code == 0
+    assert "no job that passed" in bench("correction", "choose", "SIM-0001", "--by-rule", "thermal").err
+    assert "exactly one of CORRECTION_ID and --by-rule KIND" in bench("correction", "choose", "SIM-0001").err
     assert "2099-01-01" in bench("corrections", "SIM-0001").out
     assert bench("correction", "reject", "SIM-0001", old["id"]).code == 2, "a rejection has a reason"
     refused = bench("correction", "reject", "SIM-0001", old["id"], "--remark", "another unit", "--json").json()
     assert [d["act"] for d in refused["decisions"]] == ["chosen", "approved", "rejected"]
     shown = bench("corrections", "SIM-0001").out
-    assert "current, not usable" in shown
+    assert "chosen" in shown
     assert "another unit; make another correction" in shown
     one_line(bench("corrections", "SIM-0001", "--kind", "magnetic"), "kind")
     one_line(bench("correction", "choose", "SIM-0001", "none"), "correction")

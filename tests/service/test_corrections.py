@@ -80,6 +80,18 @@ def test_one_of_a_failed_result_is_chosen_with_a_remark(client: Client, database
     assert client.http.post(f"{UNIT}/corrections/{stored['id']}/current", json=body).json()["current"]
 
 
+def test_a_kind_is_given_back_to_the_rule(client: Client, made: list[dict]) -> None:
+    one = f"{UNIT}/corrections/{made[1]['id']}"
+    chosen = client.http.post(f"{one}/current", json={"by": "Ann"}).json()
+    assert (chosen["current"], chosen["by_rule"]) == (True, False)
+    assert page(client, "/units/SIM-0001").words.count("chosen by Ann") >= 1
+    refused = client.http.post(f"{UNIT}/corrections/choose-by-rule", json={"kind": "thermal", "by": "Ann"})
+    assert (refused.status_code, refused.headers["content-type"]) == (409, "application/problem+json")
+    assert "no job that passed has given unit SIM-0001" in refused.json()["detail"], "its corrections are of no job"
+    unknown = client.http.post(f"{UNIT}/corrections/choose-by-rule", json={"kind": "magnetic"})
+    assert unknown.json()["errors"][0]["field"] == "kind"
+
+
 def test_what_does_not_exist_is_a_problem_that_says_so(client: Client, made: list[dict]) -> None:
     for path in ("/api/v1/units/NOBODY/corrections", f"{UNIT}/corrections/none"):
         answer = client.http.get(path)

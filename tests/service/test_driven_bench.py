@@ -5,11 +5,13 @@ import sys
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from contextlib import suppress
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 
+from bench_service.bench import driven
 from bench_service.bench.driven import UNWIND_S, DrivenBench
+from bench_service.wall_clock import monotonic_s
 from procedures.bench.errors import Disconnected, Stopped
 from simulators.world import WorldConfig, build
 
@@ -134,3 +136,51 @@ def test_a_session_that_ended_before_it_was_safe_does_not_say_that_it_is() -> No
     worker.close()
     with pytest.raises(Disconnected, match="ended before its devices were safe"):
         worker.make_safe()
+
+
+class Hanging(Worker):
+    """Its procedure does not come to the end of its own ending, and takes no cancel."""
+
+    async def _leave(self) -> None:
+        while True:
+            with suppress(asyncio.CancelledError):
+                await asyncio.sleep(60.0)
+            if self._closed:
+                return
+
+
+def test_a_procedure_that_does_not_end_keeps_no_device_from_being_safe(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a supervisor, as under `bench run`, nothing else would have ended it."""
+    monkeypatch.setattr(driven, "LEAVE_S", 0.2)
+    worker = Hanging()
+    begun_s = monotonic_s()
+    worker.make_safe()
+    assert monotonic_s() - begun_s < 5.0
+    assert worker._is_safe
+    assert "a job: its procedure's step could not be left within 0.2 s" in caplog.text
+    worker.close()
+
+
+def test_a_stop_while_real_devices_brake_in_tasks_of_their_own_is_not_taken_for_a_lost_driver(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(driven, "UNWIND_S", 0.2)
+    worker = Worker()
+    table, braking = worker._bench.turntable, Event()
+
+    async def brake() -> None:
+        braking.set()
+        await asyncio.sleep(0.6)
+
+    monkeypatch.setattr(table, "make_safe", brake)
+    worker._bench.safe_s = {"turntable": 10.0}
+    job = Thread(target=worker.make_safe)
+    job.start()
+    assert braking.wait(10)
+    worker._under_way = Future()
+    worker.stop()
+    job.join(10)
+    assert (worker._lost, worker._is_safe) == (None, True)
+    worker.close()

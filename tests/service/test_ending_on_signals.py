@@ -3,7 +3,7 @@
 import os
 import signal
 import threading
-from collections.abc import AsyncGenerator, Generator
+from collections.abc import AsyncGenerator, Callable, Generator
 from contextlib import asynccontextmanager, contextmanager
 from unittest.mock import MagicMock
 
@@ -11,7 +11,9 @@ import pytest
 import uvicorn
 from fastapi import FastAPI
 
-from bench_service.cli.processes import serving
+from bench_service.cli import demo as cli_demo
+from bench_service.cli.groups import services
+from bench_service.cli.processes import companion, serving
 from bench_service.cli.processes.ending import calling_at_end, ending_on_signals
 from bench_service.settings import Settings
 
@@ -111,3 +113,42 @@ def test_a_thread_leaves_the_signals_alone() -> None:
     thread.start()
     thread.join()
     assert found == [signal.SIG_DFL]
+
+
+def test_the_demonstration_leaves_its_supervisor_once_the_bench_is_safe(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In this order: no supervisor is started any more, the service makes its bench safe, the supervisor is left."""
+    seen: list[str] = []
+    driving: list[Callable[[], bool]] = []
+
+    @contextmanager
+    def serves(_: Settings) -> Generator[None]:
+        yield
+        seen.append(f"safe, supervisor {'restarted' if driving[0]() else 'not restarted'} if it ends")
+        os.kill(os.getpid(), signal.SIGTERM)  # a second one, as from `make` and the shell, interrupts nothing
+
+    @contextmanager
+    def accompanies(_: Settings, drives: Callable[[], bool]) -> Generator[None]:
+        driving.append(drives)
+        assert not drives()
+        yield
+        seen.append("supervisor left")
+
+    @contextmanager
+    def answers(*_: object, **__: object) -> Generator[None]:
+        yield
+
+    def demonstrated(*_: object) -> int:
+        assert driving[0]()
+        threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        return 0
+
+    for place, name, stand_in in (
+        (serving, "serving", serves),
+        (serving, "check_port", lambda _: None),
+        (companion, "accompanied", accompanies),
+        (services, "connect", answers),
+        (cli_demo, "demonstrate", demonstrated),
+    ):
+        monkeypatch.setattr(place, name, stand_in)
+    assert services.demo(MagicMock(obj=Settings())) == 0
+    assert seen == ["safe, supervisor not restarted if it ends", "supervisor left"]

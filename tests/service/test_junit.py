@@ -59,6 +59,20 @@ def runs(draw: st.DrawFn) -> CampaignRun:
     )
 
 
+def test_an_inconclusive_check_is_an_error_and_no_failure() -> None:
+    """The verdict of its step is error, and the reason names it."""
+    bound = check("gyro_x bias instability", 0.05, Limit("deg/h", maximum=0.015), bound=True)
+    step = StepRun(
+        "static", "no_operation", StepState.FAILED, verdict=Verdict.ERROR, checks=(bound,), reason="it is inconclusive"
+    )
+    campaign = Campaign.model_validate({"name": "trial", "steps": [{"name": "static", "procedure": "no_operation"}]})
+    at = datetime(2031, 5, 6, tzinfo=UTC)
+    run = CampaignRun("run", campaign, "U", "sim", JobState.FAILED, at, (step,), verdict=Verdict.ERROR)
+    (suite,) = ElementTree.fromstring(document(run)).findall("testsuite")
+    assert (suite.get("failures"), suite.get("errors")) == ("0", "2")
+    assert suite.findall("testcase")[0].find("error").get("type") == "Inconclusive"  # pyright: ignore[reportOptionalMemberAccess]
+
+
 @given(runs())
 def test_every_outcome_is_a_document_that_readers_take(run: CampaignRun) -> None:
     made = document(run)

@@ -146,10 +146,15 @@ class Unsure(FailingDriver):
     def make_safe(self, by: str) -> Any:
         if not self.helps:
             raise BenchError("the supply does not answer")
+        return DeviceState()
 
 
 @pytest.mark.parametrize(
-    ("helps", "then"), [(True, "a new link has made it safe since"), (False, "the supply does not answer")]
+    ("helps", "then"),
+    [
+        (True, "it was made safe afterwards, over a new link"),
+        (False, "it could not be made safe: the supply does not answer"),
+    ],
 )
 def test_a_bench_that_does_not_read_as_safe_is_stopped_and_not_noted_as_safe(
     tmp_path: Path, helps: bool, then: str
@@ -160,4 +165,4 @@ def test_a_bench_that_does_not_read_as_safe_is_stopped_and_not_noted_as_safe(
     lab.thread.start()
     assert lab.noted() == {"because": "ended by bob", "safe": False}
     assert lab.books.end_of == ("ended by bob", False)
-    assert lab.books.stops == [f"could not be made safe: at the end of manual mode the unit is on; {then}"]
+    assert lab.books.stops == [f"was not safe at the end of manual mode: the unit is on; {then}"]

@@ -200,3 +200,14 @@ def test_the_shelf_of_figures_is_bounded() -> None:
     assert shelf.put(made[4], "1") == versions[4]
     assert shelf.put(made[4], "2") != versions[4], "other code may draw it otherwise"
     assert shelf.get(None) is None
+
+
+def test_no_script_opens_what_takes_the_stop_away() -> None:
+    """The browser's own boxes, modal dialogs, popovers and the full screen lie over all of a page, its stop too."""
+    taking = re.compile(
+        r"\.showModal\(|\.showPopover\(|\.requestFullscreen\(|(?<![\w.])(?:window\.)?(?:alert|confirm|prompt)\("
+    )
+    folder = files("bench_service.pages") / "static"
+    scripts = [file for file in folder.iterdir() if file.name.endswith(".js")]
+    assert scripts
+    assert [file.name for file in scripts if taking.search(file.read_text())] == []

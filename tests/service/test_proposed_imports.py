@@ -63,7 +63,7 @@ def test_the_command_describes_confirms_and_imports(tmp_path: Path, capsys: pyte
     assert "EuRoC, 300 rows, 200 Hz" in described.err
     assert run_command_line(settings, ["import", str(good), "--unit", "E-1"]) == 2
     assert "confirm it with --yes" in capsys.readouterr().err
-    assert run_command_line(settings, ["import", str(good), "--unit", "E-1", "--yes"]) == 0
+    assert run_command_line(settings, ["import", str(good), "--unit", "E-1", "--yes", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["unit"] == "E-1"
     assert run_command_line(settings, ["import", str(bad), "--unit", "E-1", "--yes"]) == 2
     assert "not known: save the description" in " ".join(capsys.readouterr().err.split())

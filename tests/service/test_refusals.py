@@ -287,6 +287,14 @@ def recording(sqlite_client: Client) -> str:
         ("stop_s=inf", "stop_s", "inf", "finite number"),
         ("stop_s=0.5", "stop_s", 0.5, "0 … 0.03"),
         ("start_s=0.02&stop_s=0.01", "stop_s", 0.01, "not before start_s = 0.02"),
+        (
+            "start_s=0.02&stop_s=0.02",
+            "stop_s",
+            0.02,
+            "none begins within 0.02 … 0.02 s; start_s and stop_s count from the",
+        ),
+        ("stop_s=0", "stop_s", 0.0, "first sample, 0 … 0.03"),
+        ("start_s=0.03", "start_s", 0.03, "none begins within 0.03 … 0.03 s"),
         ("channels=gyro_x,gyro_x", "channels", "['gyro_x', 'gyro_x']", "each once"),
     ],
 )
@@ -294,6 +302,8 @@ def test_samples_that_cannot_be_taken_out_as_asked_are_refused_by_field(
     client: Client, recording: str, query: str, field: str, value: object, words: str
 ) -> None:
     assert_field(client.http.get(f"/api/v1/recordings/{recording}/data?{query}"), field, value, words)
+    if field != "format":
+        assert_field(client.http.get(f"/api/v1/recordings/{recording}/samples?{query}"), field, value, words)
 
 
 @pytest.mark.parametrize("name", ["gyro_z", "", "gyro_x;"])

@@ -211,3 +211,31 @@ def test_a_wall_clock_that_jumps_changes_no_judgement(
         supervisor.look()
         pause(0.1)
     assert worker.poll() is None, "a jump of the clock was taken for ten seconds without an answer"
+
+
+def test_devices_that_a_living_worker_has_left_unsafe_are_made_safe_without_any_stop(
+    tmp_path: Path, worker: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It could not reach them, nor the database to stop the bench: nobody else would try before that is back."""
+    monkeypatch.setattr("bench_service.bench.supervisor.LEFT_S", 0.3)
+    register, books = abandoned(tmp_path, "job-1"), Books()
+    link = register.open("the worker", "job-1")
+    supervisor = supervised(
+        tmp_path, RegisteredDevices(register), Watch(Driving(identity(worker))), books, Lease().take
+    )
+
+    def look_for(seconds: float) -> None:
+        end_s = monotonic_s() + seconds
+        while monotonic_s() < end_s:
+            supervisor.look()
+            pause(0.05)
+
+    look_for(0.5)
+    assert not state(tmp_path).safe, "the worker has their link"
+    link.close()
+    look_for(0.2)
+    assert not state(tmp_path).safe, "the worker may make them safe over a new link"
+    look_for(0.6)
+    assert (state(tmp_path).safe, worker.poll()) == (True, None)
+    assert "job-1: its worker has left it unsafe, and the table moves and the unit is on: made safe" in books.said[0]
+    assert not books.is_stopped

@@ -1,9 +1,19 @@
 """Synthetic recordings through REST: noise of chosen coefficients, marked for ever, of no unit's history."""
 
+import html
+import io
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
+from rich.console import Console
 
+from bench_service.cli.printing.tables import check_table
+from bench_service.evidence.reports.result_report import verdict_blocks
+from bench_service.formats.printed.document import PrintedTable
 from procedures.core import units
+from procedures.core.limits import Verdict
 from procedures.core.noise import NoiseCoefficients
 from simulators.imu.synthesis import synthesise
 from tests.service.client import Client
@@ -45,6 +55,27 @@ def test_a_method_finds_what_was_put_in_and_no_unit_has_the_result(sqlite_client
         reading = found[process]
         assert abs(reading["value"] / size - true) < 4.5 * reading["standard_uncertainty"] / size
     assert found["rate_random_walk"]["value"] is None
+
+
+def test_what_was_not_observed_is_inconclusive_on_page_terminal_and_paper(sqlite_client: Client, made: dict) -> None:
+    """White noise alone shows no bias instability; two hours bound it above so small a limit."""
+    limits = {"gyro_random_walk_deg_sqrt_h": 0.002, "gyro_bias_in_run_deg_h": 1e-5}
+    parameters = {"trim": "none", "wavelet": "none", "noise_limits": limits}
+    body = {"method": "noise_analysis", "recordings": [made["id"]], "parameters": parameters}
+    result = sqlite_client.http.post("/api/v1/analyses", json=body).json()
+    assert (result["verdict"], result["document"]["statement"]["outcome"]) == ("error", "inconclusive")
+    console = Console(file=io.StringIO(), width=200)
+    console.print(check_table(result["document"]))
+    terminal = console.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+    stored: Any = SimpleNamespace(verdict=Verdict.ERROR, document=result["document"])
+    paper = next(block for block in verdict_blocks(stored) if isinstance(block, PrintedTable))
+    page = sqlite_client.http.get(f"/results/{result['id']}").text
+    for shown in (terminal, str(paper), html.unescape(page)):
+        assert "the request" in shown
+        assert "inconclusive" in shown
+        assert "< 0.0" in shown
+        assert "not observed: the value is what it stays below" in shown
+    assert "1 of 2 checks passed, 1 inconclusive" in page
 
 
 def test_its_serial_belongs_to_nothing_else(sqlite_client: Client, made: dict) -> None:

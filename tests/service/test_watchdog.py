@@ -3,24 +3,30 @@
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Generator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bench_service import driving
 from bench_service.bench import driven
+from bench_service.bench.devices import DeviceState
 from bench_service.bench.watchdog import TimeLimits, Watchdog
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
-from bench_service.jobs.runner import JobRunner
-from bench_service.model.job import Job, JobState
+from bench_service.jobs import runner as runner_of_jobs
+from bench_service.jobs.runner import JobRunner, StepOutcome
+from bench_service.model.job import Failure, Job, JobState
 from bench_service.persistence import open_stores
-from bench_service.wall_clock import monotonic_s
+from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.imu import Stream
 from tests.kit.begun_job import prepared
@@ -201,3 +207,89 @@ def test_what_counts_as_silence() -> None:
     real.heard("imu")
     real.begin("operator.set_by_hand", {})
     assert real.silence(1e5, 1e5) is None  # a person takes the time that it takes
+
+
+class Unsure(FailingDriver):
+    """Its register has the unit as on at the job's end, whatever was done."""
+
+    ended = False
+
+    def device_state(self) -> Any:
+        state = super().device_state()
+        return DeviceState(powered=True) if self.ended and state is not None and not state.linked else state
+
+    def make_safe(self, by: str) -> Any:
+        self.ended = False
+        return super().make_safe(by)
+
+
+def test_a_job_whose_devices_do_not_read_as_safe_at_its_end_stops_the_bench(stores: Stores, tmp_path: Path) -> None:
+    driver = Unsure(tmp_path)
+    runner, job = prepared(stores, driver, lambda: True)
+    assert runner.acquire(job.id, 0).good
+    driver.ended = True
+    outcome = runner.make_safe(job.id)
+    why = "was not safe at the end of the job: the unit is on; it was made safe afterwards, over a new link"
+    assert outcome.failure == Failure("NotSafe", f"the bench {why}")
+    stop = stores.benches.bench_stop("sim")
+    assert stop is not None
+    assert stop.reason == why
+
+
+def test_a_stop_tries_again_at_devices_that_an_attempt_has_given_up(
+    stores: Stores, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A command that drives a bench has no supervisor: nobody else tries before a person releases the bench."""
+    monkeypatch.setattr(runner_of_jobs, "AGAIN_S", 0.05)
+    driver = FailingDriver(tmp_path)
+    runner, job = prepared(stores, driver, lambda: True)
+
+    def fall_silent(bench: Bench) -> None:
+        hang_move(lost)(bench)
+        driver.unreachable = True
+
+    driver.change = fall_silent
+    assert runner.acquire(job.id, 0).failure is not None
+    runner.stop_now()
+    assert runner.make_safe(job.id).failure is not None
+    watch: Any = SimpleNamespace(supervisor=lambda: None)
+    stop_again = partial(driving._stop_now, runner, MagicMock(), watch)
+    stop_again()
+    assert not safe(driver)
+    driver.unreachable = False
+    watch.supervisor = lambda: "a supervisor, which does it"
+    pause(0.06)
+    stop_again()
+    assert not safe(driver)
+    watch.supervisor = lambda: None
+    stop_again()
+    assert safe(driver)
+
+
+def test_the_jobs_own_thread_does_not_meet_the_stops_link(stores: Stores, tmp_path: Path) -> None:
+    """While the stop's thread gives a lost link back, the devices are not yet free: the job's thread waits for it."""
+    driver = FailingDriver(tmp_path, hang_move(lost))
+    runner, job = prepared(stores, driver, lambda: True)
+    assert runner.acquire(job.id, 0).failure is not None
+    session, closing, go_on = runner._session, Event(), Event()
+    assert session is not None
+    close = session.close
+
+    def slow() -> None:
+        closing.set()
+        assert go_on.wait(10)
+        close()
+
+    session.close = slow
+    stopping, ending = Thread(target=runner.stop_now), Thread(target=lambda: ends.append(runner.make_safe(job.id)))
+    ends: list[StepOutcome] = []
+    stopping.start()
+    assert closing.wait(10)
+    ending.start()
+    ending.join(0.2)
+    go_on.set()
+    for thread in (stopping, ending):
+        thread.join(10)
+    assert ends == [StepOutcome()]
+    assert safe(driver)
+    assert stores.benches.bench_stop("sim") is None

@@ -26,7 +26,7 @@ from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
 from procedures.steps import record_station
 from tests.kit import line_devices
-from tests.kit.line_devices import LineDevice, bench_text, served
+from tests.kit.line_devices import LineChamber, LineDevice, bench_text, served
 
 
 @dataclass
@@ -323,9 +323,15 @@ def test_identities_are_in_the_description_and_another_device_refuses_the_job(ea
         driver.open("SIM-0001", 3, None, BenchNeeds(), "job-2")
 
 
-def test_the_devices_own_limits_narrow_the_description(east: East) -> None:
+def test_the_devices_own_limits_narrow_the_description_and_are_logged_once(
+    east: East, caplog: pytest.LogCaptureFixture
+) -> None:
     east.table.state["limits"] = {"outer.rate_deg_s": 30.0}
-    assert east.driver().description.outer.rate_deg_s == 30.0
+    driver = east.driver()
+    assert driver.description.outer.rate_deg_s == 30.0
+    for _ in range(2):
+        driver.open("SIM-0001", 3, None, BenchNeeds(), "job-2").close()
+    assert caplog.text.count("turntable.outer.rate_deg_s: the file has 60, the device 30; 30 holds") == 1
 
 
 def test_a_simulated_unit_stands_in_the_real_chambers_air(east: East) -> None:
@@ -352,3 +358,23 @@ def test_a_wrong_address_is_told_and_commands_nothing(east: East) -> None:
     with pytest.raises(Disconnected, match=r"the turntable is not reached: tcp://127\.0\.0\.1:1 does not answer"):
         _open(east)
     assert east.supply.demands() == []
+
+
+def test_a_driver_that_cannot_make_its_device_keeps_no_other_from_being_made_safe(
+    east: East, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As one whose maker's library is gone since an upgrade."""
+    _unsafe(east)
+
+    def gone(*_: object) -> Any:
+        raise ImportError("no module named 'makers_library'")
+
+    monkeypatch.setattr(LineChamber, "__init__", gone)
+    obstacle = over_new_link(east.devices(), "a test")
+    assert obstacle is not None
+    assert obstacle.reasons == ("the chamber: no module named 'makers_library'",)
+    assert not east.table.state["moving"]
+    assert not east.supply.state["on"]
+    state = east.register().read()
+    assert state is not None
+    assert [why.partition(" ")[0] for why in state.unsafe if "makers_library" not in why] == ["the"]

@@ -45,6 +45,9 @@ EVERY_S = 2.0
 """Interval between two looks at the process [s]."""
 CALM_S = 25.0
 """Time without faults at the end, in which a job must succeed [s]."""
+WARM_S = 60.0
+"""Longest wait for the process that draws [s]. The service begins it while no job runs: under load that is late, and
+its nine pipes are no growth."""
 MANUAL, MANUAL_SHARE = "/api/v1/benches/east/manual", 0.15
 BY_HAND_S = 4.0
 EXPLAINED_S = 90.0
@@ -180,6 +183,7 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
         kills, next_kill_s = list[float](), monotonic_s() + (chance.expovariate(1.0 / kill_s) if kill_s else np.inf)
         try:
             bench.start()
+            bench.until(lambda: descriptors_of(psutil.Process(bench.process.pid), {})["pipe"] > 0, WARM_S)
             begun_s, looked_s, at_rest_s = monotonic_s(), 0.0, 0.0
             names = {bench.client.base_url.port or 0: "clients"} | {n: f"the {k}" for k, n in behind.numbers.items()}
             end_s = begun_s + 60.0 * minutes

@@ -9,8 +9,10 @@ import pytest
 
 from bench_service import wall_clock
 from bench_service.campaigns.stores import Stores
+from bench_service.evidence.corrections import StoredCorrection
 from bench_service.model.calibrations import Act, Approval, Decider
 from bench_service.model.errors import CorrectionRefused, IdempotencyConflict, NotFound
+from bench_service.model.job import Job, JobState
 from bench_service.model.records import Idempotency, StoredResult
 from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
@@ -116,6 +118,36 @@ def test_a_person_chooses_which_one_is_current(stores: Stores, new_result: NewRe
     assert (
         stores.corrections.current("U-1", "thermal") == chosen_again == replace(new, decisions=chosen_again.decisions)
     )
+
+
+def test_a_persons_choice_stands_until_it_is_given_back_rejected_or_expires(
+    stores: Stores, new_result: NewResult, new_job: Callable[..., Job]
+) -> None:
+    def passed(seed: int) -> StoredCorrection:
+        """The correction of a job that passed, as its own result."""
+        job = stores.jobs.add(new_job(state=JobState.RUNNING))
+        result = stores.results.add(new_result(job_id=job.id), corrections=[thermal(seed)])
+        stores.jobs.transition(
+            job.id, JobState.SUCCEEDED, at=wall_clock.now(), verdict=result.verdict, result_id=result.id
+        )
+        return next(c for c in stores.corrections.list("U-1").items if c.result_id == result.id)
+
+    with pytest.raises(CorrectionRefused, match="no job that passed has given unit U-1 a usable correction"):
+        stores.corrections.choose_by_rule("U-1", "thermal", ANN)
+    old = passed(1)
+    assert (old.current, old.by_rule, old.of_job) == (True, True, True)
+    chosen = stores.corrections.make_current("U-1", old.id, ANN)
+    assert (chosen.current, chosen.by_rule) == (True, False)
+    newer = passed(2)
+    assert not newer.current, "Ann's choice stands"
+    assert "one that a person chose stands" in newer.why_not_current
+    back = stores.corrections.choose_by_rule("U-1", "thermal", Decider("Bo", "the new cycle is better"))
+    assert (back.id, back.current, back.by_rule) == (newer.id, True, True)
+    assert [(d.act, d.by) for d in back.decisions] == [(Act.GIVEN_BACK, "Bo")]
+    assert passed(3).current, "the rule takes the newest again"
+    stores.corrections.make_current("U-1", old.id, ANN)
+    stores.corrections.reject("U-1", old.id, ANN)
+    assert passed(4).current, "a rejected one does not stand"
 
 
 def test_of_many_choices_at_once_one_stands(stores: Stores, new_result: NewResult) -> None:

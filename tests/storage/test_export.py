@@ -12,8 +12,7 @@ import pytest
 
 from bench_service.formats.content_hash import content_hash
 from bench_service.formats.description import ImportDescription
-from bench_service.formats.export import export, extract
-from bench_service.formats.export_format import ExportFormat
+from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile, read_import
 from bench_service.model.records import NewRecording
 from procedures.core.errors import BadParameter, MissingChannel

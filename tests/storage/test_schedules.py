@@ -63,6 +63,15 @@ def test_a_start_on_time(scheduler: Scheduler, stores: Stores) -> None:
     assert (after.last_run, after.last_outcome) == (run.id, "started")
 
 
+def test_a_start_once_is_the_only_one(scheduler: Scheduler, stores: Stores) -> None:
+    schedule = due(stores, scheduler, once=True)
+    assert scheduler.fire(schedule, DUE + timedelta(seconds=2))
+    after = scheduler.get(schedule.id)
+    assert (after.enabled, after.next_at, after.last_at, after.last_outcome) == (False, None, DUE, "started")
+    assert stores.campaigns.due_schedules(DUE + timedelta(days=800)) == ()
+    assert len(runs(stores)) == 1
+
+
 @pytest.mark.parametrize("nights", [0, 3])
 @pytest.mark.parametrize("missed", list(Missed))
 def test_a_missed_start(scheduler: Scheduler, stores: Stores, missed: Missed, nights: int) -> None:

@@ -4,7 +4,8 @@
 (``make validate``). Launches and thermal legs are scaled (`acceptance_rig.SCALED`), the table follows exactly
 (`light_bench`), and E runs share the static launches, the converter and the thermal cycle of one unit, the first of
 them with the inspection of its recordings; K runs are whole, with the servo, each with its own. A fault of a later
-launch is put into runs that were sound so far.
+launch is put into runs that were sound so far. Beside the outcome of the sound runs stands what the campaign's preview
+foresaw of each check (`acceptance_preview`).
 Exit code 1 where passes or detections are fewer than 95 % of the runs allow: by the binomial distribution at 1 %.
 """
 
@@ -18,6 +19,7 @@ from functools import partial
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one thread a worker
 
+from rich.console import Console
 from scipy.stats import binom
 
 from bench_service.campaigns.campaign import Campaign
@@ -25,6 +27,8 @@ from bench_service.campaigns.shipped import shipped
 from procedures.core.limits import Verdict
 from tests.validation import light_bench
 from tests.validation.acceptance_faults import AFTER, Fault, faults
+from tests.validation.acceptance_preview import LEVEL as LEVEL_OF_INTERVALS
+from tests.validation.acceptance_preview import Values, foreseen, table_of, values_of
 from tests.validation.acceptance_rig import Course, course, scaled, told
 
 SHARE, LEVEL = 0.95, 0.01
@@ -45,11 +49,12 @@ def ended(found: Course) -> Ended:
     return (found.run.verdict or Verdict.ERROR).value, told(found.run)
 
 
-def sound(unit: int, campaign: Campaign, each: int) -> list[Ended]:
-    """Runs of one sound unit that share its launches and its thermal cycle."""
+def sound(unit: int, campaign: Campaign, each: int) -> list[tuple[Ended, Values]]:
+    """Runs of one sound unit that share its launches and its thermal cycle, with the values of their checks."""
     first = course(campaign, BASE * (unit + 1), NONE, until="scale_1")
     seeds = [BASE * (unit + 1) + NEXT * (k + 1) for k in range(each)]
-    return [ended(course(campaign, seed, NONE, first, inspected=k == 0)) for k, seed in enumerate(seeds)]
+    runs = [course(campaign, seed, NONE, first, inspected=k == 0) for k, seed in enumerate(seeds)]
+    return [(ended(found), values_of(found.run)) for found in runs]
 
 
 def whole(unit: int, campaign: Campaign) -> Ended:
@@ -86,6 +91,19 @@ def tell(runs: Sequence[Ended], title: str) -> bool:
     return passed >= least(len(runs))
 
 
+def beside(campaign: Campaign, values: Sequence[Sequence[Values]]) -> None:
+    """Print what the campaign's preview foresaw of each check beside the outcome of the sound runs; not judged."""
+    light_bench.use()
+    rows = foreseen(campaign, values)
+    console = Console(width=150)
+    console.print(table_of(rows))
+    apart = sum(not row.holds for row in rows)
+    told = (
+        f"{apart} of {len(rows)} checks scatter otherwise than foreseen, {LEVEL_OF_INTERVALS * len(rows):.1f} by chance"
+    )
+    console.print(f"Preview beside outcome, root mean squares over runs: {told}.")
+
+
 def main() -> int:
     """Sound units, then each fault."""
     parser = argparse.ArgumentParser(description="The campaign acceptance on sound and faulty units")
@@ -104,13 +122,16 @@ def main() -> int:
     with ProcessPoolExecutor(options.workers, initializer=light_bench.use) as pool:
         units = range(-(-options.seeds // options.each))
         found: list[Ended] = []
+        values: list[list[Values]] = []
         for of in pool.map(partial(sound, campaign=campaign, each=options.each), units):
-            found += of
-            failed = [said for verdict, said in of if verdict != "pass"]
+            found += [run for run, _ in of]
+            values.append([checks for _, checks in of])
+            failed = [said for (verdict, said), _ in of if verdict != "pass"]
             print(
                 f"  sound so far: {sum(v == 'pass' for v, _ in found)} of {len(found)} pass {failed or ''}", flush=True
             )
         held &= tell(found[: options.seeds], "sound unit") if options.seeds else True
+        beside(campaign, values)
         every = [f for f in faults(campaign) if not options.only or f.name in options.only]
         wanted = [f.name for f in every if f.resolved]
         drawn = []

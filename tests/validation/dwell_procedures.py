@@ -187,9 +187,9 @@ def _compared(name: str, group: str, fixed: Sequence[Measured], stopped: Sequenc
     drawn = np.random.default_rng(5).integers(squares.shape[1], size=(RESAMPLES, squares.shape[1]))
     ratios = np.sqrt(squares[1][drawn].mean(axis=1) / squares[0][drawn].mean(axis=1))
     low, high = np.quantile(ratios, (0.025, 0.975)).tolist()
-    spreads = np.sqrt(squares.mean(axis=1)).tolist()
+    of_fixed, of_rule = np.sqrt(squares.mean(axis=1)).tolist()
     claimed = float(np.sqrt(claims[1].mean() / claims[0].mean()))
-    return Compared(name, group, *spreads, low, high, claimed)
+    return Compared(name, group, of_fixed, of_rule, low, high, claimed)
 
 
 def table_of(rows: Sequence[Compared]) -> Table:

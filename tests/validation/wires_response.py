@@ -51,11 +51,8 @@ def response(pace: float, stands: bool, seed: int, parameters: dict[str, Any]) -
         served(LANGUAGES, factor=pace, world=WorldConfig(seed=seed)) as behind,
     ):
         folder = Path(name)
-        settings = Settings(
-            database_url=f"sqlite:///{folder / 'b.sqlite'}",
-            bench_file=bench_file(folder, behind, 1.0, after_demand_s=0.02),
-            bench_id="east",
-        )
+        file = bench_file(folder, behind, 1.0, after_demand_s=0.02)
+        settings = Settings(database_url=f"sqlite:///{folder / 'b.sqlite'}", bench_file=file, bench_id="east")
         driver = driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]
         context = Context(replace(declared_unit(default_unit()), serial="GL017"), driver.description)
         params = RESPONSE.resolve(RESPONSE.params.model_validate(parameters), context)

@@ -4,10 +4,11 @@ Three launches in the chamber with x, y and z up, legs of at least 20 min: the p
 of a bench whose devices and person are served at a time factor. The service's own code drives it, from the bench file
 on. Without ``--factor`` half the highest factor is taken at which the served world alone gives up hardly any time.
 
-The same seed gives the same launches: their coefficients, their noise, the lean of each setting. The chamber's course
-is another, for each demand reaches it at another tick. Compared are the corrections with their covariances, the gyros'
-slopes, what the soaks are left with, and the durations. Exit code 1 where a sum of squares, or a single figure, is
-beyond what chance allows once in a thousand, or where time was given up.
+The same seed gives the same launches: their coefficients, their noise, the lean of each setting. The gyros, which do
+not depend on temperature here, must count the same, sample by sample, over the whole of each launch. The chamber's
+course is another, for each demand reaches it at another tick, and the accelerometers follow it. Compared are the
+corrections with their covariances, the gyros' slopes, what the soaks are left with, and the durations. Exit code 1
+where a sum of squares, or a single figure, is beyond what chance allows once in a thousand, or where time was given up.
 """
 
 import argparse
@@ -54,6 +55,8 @@ TRIAL_S = 8.0
 GIVEN_UP = 1e-3
 """Share of bench time that may be given up."""
 CHANCE = 1e-3
+GYROS, FIRST = 3, 50
+"""Number of the gyros' columns, and of samples by which a recording's place in the launch is found."""
 
 
 @dataclass(frozen=True)
@@ -96,11 +99,8 @@ def over_wires(factor: float, seed: int, rate_hz: float) -> tuple[Cycle, BenchDe
         served(LANGUAGES, thermal=True, factor=factor, world=world) as behind,
     ):
         folder = Path(name)
-        settings = Settings(
-            database_url=f"sqlite:///{folder / 'b.sqlite'}",
-            bench_file=bench_file(folder, behind, factor, after_demand_s=0.02),
-            bench_id="east",
-        )
+        file = bench_file(folder, behind, factor, after_demand_s=0.02)
+        settings = Settings(database_url=f"sqlite:///{folder / 'b.sqlite'}", bench_file=file, bench_id="east")
         driver = driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]
         bench, before_s = driver.open("GL017", None, None, BenchNeeds(temperatures=True)), behind.bench.pace.behind_s
         try:
@@ -150,12 +150,13 @@ def compared(wired: Cycle, inside: Cycle, console: Console) -> list[str]:
     number = len(a.axes) + len(a.gyros)
     for axis, one, other in zip("xyz", a.axes, b.axes, strict=True):
         square, freedom = _square(one.correction, other.correction)
-        words = (f"{c.alpha[3] * 1e6:.2f} ppm/°C, {c.beta[2] * 1e6:.1f} µm/s²/°C" for c in (_c(one), _c(other)))
-        judged(f"correction {axis}: χ² of {freedom}", *words, square, float(chi2.isf(CHANCE / number, freedom)))
+        first, second = (_words(fit.correction) for fit in (one, other))
+        most = float(chi2.isf(CHANCE / number, freedom))
+        judged(f"correction {axis}: χ² of {freedom}", first, second, square, most)
     for one, other in zip(a.gyros, b.gyros, strict=True):
         z = abs(one.slope_rad_s_c - other.slope_rad_s_c) / np.hypot(one.slope_sd_rad_s_c, other.slope_sd_rad_s_c)
-        words = (f"{g.slope_rad_s_c:.2e} rad/s/°C" for g in (one, other))
-        judged(f"gyro {one.axis} slope: z", *words, float(z), float(norm.isf(CHANCE / number / 2.0)))
+        first, second = (f"{g.slope_rad_s_c:.2e} rad/s/°C" for g in (one, other))
+        judged(f"gyro {one.axis} slope: z", first, second, float(z), float(norm.isf(CHANCE / number / 2.0)))
     for k, axis in enumerate("xyz"):
         worst = [1e6 * max(s.after_m_s2[k] for s in c.soaks) for c in (a, b)]
         table.add_row(f"worst 3σ of a soak, {axis} [µm/s²]", *(f"{w:.0f}" for w in worst), "", "")
@@ -168,8 +169,24 @@ def compared(wired: Cycle, inside: Cycle, console: Console) -> list[str]:
     return wrong
 
 
-def _c(axis: Any) -> Any:
-    return axis.correction
+def same_counts(wired: Cycle, inside: Cycle, console: Console) -> list[str]:
+    """Print whether each run's gyros counted over wires what they count in process; what is wrong."""
+    wrong: list[str] = []
+    for one, other in zip(wired.recordings, inside.recordings, strict=True):
+        label = "" if one.info.station is None else one.info.station.label
+        over, within = (np.asarray(r.raw)[:, :GYROS] for r in (one, other))
+        starts = np.flatnonzero((within[: len(within) - FIRST] == over[0]).all(axis=1))
+        offsets = [k for k in starts.tolist() if np.array_equal(within[k : k + FIRST], over[:FIRST])]
+        count = min(len(over), len(within) - offsets[0]) if offsets else 0
+        same = count > 0 and np.array_equal(over[:count], within[offsets[0] : offsets[0] + count])
+        words = f"the same in all {count} samples, begun {offsets[0]} later" if same else "not those in process"
+        console.print(f"counts of the gyros, {label}: {words}")
+        wrong += [] if same else [f"{label}: the gyros' counts are not those in process"]
+    return wrong
+
+
+def _words(correction: Any) -> str:
+    return f"{correction.alpha[3] * 1e6:.2f} ppm/°C, {correction.beta[2] * 1e6:.1f} µm/s²/°C"
 
 
 def _square(one: Any, other: Any) -> tuple[float, int]:
@@ -202,7 +219,7 @@ def main() -> int:
     world = WorldConfig(seed=given.seed, sample_rate_hz=given.rate_hz, thermal=True)
     inside = cycle(build(world), description)
     console.print(f"in process: {inside.bench_s / 3600.0:.2f} h of bench time in {inside.took_s:.0f} s")
-    wrong = compared(wired, inside, console)
+    wrong = compared(wired, inside, console) + same_counts(wired, inside, console)
     if wired.given_up_s > GIVEN_UP * wired.bench_s:
         wrong.append(f"{wired.given_up_s:.1f} s of bench time were given up: take a lower factor")
     console.print("\n".join(wrong) if wrong else "[green]they agree[/green]")

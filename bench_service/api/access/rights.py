@@ -55,6 +55,7 @@ RIGHTS: dict[str, Right] = {
     "describe_file": Right.ENGINEER,
     "declare_unit": Right.ENGINEER,
     "choose_correction": Right.ENGINEER,
+    "choose_correction_by_rule": Right.ENGINEER,
     "approve_correction": Right.ENGINEER,
     "reject_correction": Right.ENGINEER,
     "enter_calibration": Right.ENGINEER,

@@ -99,8 +99,8 @@ async def stop(
 
     The stop goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its
     place the bench's supervisor. The database follows when it can; `books` says why where it has not yet. Several stops
-    of a bench can stand at the same time, sixteen at most: of one more, `books` says that it waits. Sent again with its
-    Idempotency-Key it is the same stop, as long as this process lives.
+    of a bench can stand at the same time, sixteen at most: of one more, `books` says that it waits. Sent again within
+    ten minutes with its Idempotency-Key it is the same stop, as long as this process lives.
     """
     asked = body or StopRequest.model_validate({})
     by = sender.name(asked.by) or client

@@ -20,7 +20,7 @@ OF_A_SCHEDULE = ("read_schedule", "change_schedule", "remove_schedule")
 
 
 class ScheduleSubmission(Request):
-    """Request to run a campaign on a unit at repeated times."""
+    """Request to run a campaign on a unit at repeated times, or once."""
 
     cron: str = Field(
         min_length=1,
@@ -42,6 +42,7 @@ class ScheduleSubmission(Request):
         300.0, ge=1.0, le=604_800.0, allow_inf_nan=False, description="Delay after which a start counts as missed [s]"
     )
     overlap: Overlap = Field(Overlap.SKIP, description="Start while the previous run is open: skip or queue")
+    once: bool = Field(False, description="Whether the next start is the only one: then it is switched off")
     enabled: bool = True
     labels: Labels = Field(default_factory=Labels, max_length=20)
 

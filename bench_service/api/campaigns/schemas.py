@@ -153,6 +153,7 @@ class ScheduleView(BaseModel):
     missed: Missed
     start_within_s: float
     overlap: Overlap
+    once: bool = Field(description="Whether the next start is the only one")
     labels: Labels
     team: str = Field(description="Team whose members change it and act on its runs; empty: everybody")
     created_at: datetime

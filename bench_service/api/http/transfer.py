@@ -5,7 +5,7 @@ from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddle
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bench_service.formats.export_format import ExportFormat
+from bench_service.formats.export import ExportFormat
 
 LEAST_BYTES = 1000
 """Size below which an answer is not compressed: it would still be one packet [bytes]."""

@@ -12,6 +12,7 @@ from bench_service.api.units.calibrations import DeciderOf
 from bench_service.api.units.schemas import (
     CorrectionChoice,
     CorrectionPage,
+    CorrectionRuleChoice,
     CorrectionView,
     UnitDeclaration,
     UnitView,
@@ -69,6 +70,16 @@ def list_corrections(
     service.stores.units.unit(serial)
     page = service.stores.corrections.list(serial, kind=kind, after=after, limit=limit)
     return CorrectionPage(items=[CorrectionView.of(c) for c in page.items], next=page.next)
+
+
+@router.post("/{serial}/corrections/choose-by-rule", responses=problems(404, 409, 413, 507))
+def choose_correction_by_rule(
+    serial: str, body: CorrectionRuleChoice, service: Service, decider: DeciderOf
+) -> CorrectionView:
+    """Give a kind of correction back to the rule: its newest usable one by a job that passed becomes current."""
+    service.stores.units.unit(serial)
+    by = decider(body.by, body.remark)
+    return CorrectionView.of(service.stores.corrections.choose_by_rule(serial, body.kind, by))
 
 
 @router.get("/{serial}/corrections/{correction_id}", responses=problems(404))

@@ -75,6 +75,7 @@ class CorrectionView(BaseModel):
     verdict: Verdict = Field(description="Verdict of the result that gave it")
     made_at: datetime
     current: bool
+    by_rule: bool = Field(description="Whether the rule made it current, not a person; false while it is not current")
     not_current: str = Field(description="Why it is not current, and the way out; empty where it is")
     simulated: bool
     thermal: ThermalCorrection | None = Field(description="Thesis 4.1, of the kind `thermal`; else null")
@@ -106,6 +107,12 @@ class CorrectionChoice(Request):
 
     by: Annotated[str, NAME] | None = Field(None, description="Person who decides; null: the client's name")
     remark: Remark = Field("", description="Needed for a correction of a result that did not pass")
+
+
+class CorrectionRuleChoice(CorrectionChoice):
+    """Request to give a kind of correction back to the rule."""
+
+    kind: CorrectionKind = Field(description="Kind whose newest usable correction by a job that passed is to count")
 
 
 class CorrectionPage(BaseModel):

@@ -23,12 +23,12 @@ from typing import Any
 from bench_service.bench.records_in_place import (
     RECORD_BYTES,
     Unreadable,
-    decoded,
     encoded,
     preallocate,
     read_record,
     write_record,
 )
+from bench_service.bench.stop.channel_records import document_in, words_in
 from bench_service.bench.stop.folder_sockets import bound, send
 from bench_service.bench.stop.word import DAMAGED, StopAnswer, StopWord
 from bench_service.wall_clock import monotonic_s, pause
@@ -120,7 +120,7 @@ class StopChannel:
             return
         with suppress(OSError), self._locked() as file:
             for number in range(_FIRST, _FIRST + WORDS):
-                found = _document(file, number)
+                found = document_in(file, number)
                 if found is not None and found["id"] == DAMAGED.id:
                     record = encoded(StopWord(DAMAGED.reason, DAMAGED.by, DAMAGED.via).document())
                     assert record is not None, "its texts are short"
@@ -220,25 +220,24 @@ class StopChannel:
 
     def _read(self) -> tuple[StopWord, ...]:
         """Read the stop requests; they are parsed again only after a change."""
-        size = WORDS * RECORD_BYTES
+        size, page = WORDS * RECORD_BYTES, b""
         for _ in range(20):
             page = os.pread(self._open(), size, _FIRST * RECORD_BYTES)
             if page == self._last[0]:
                 return self._last[1]
             with suppress(Unreadable):
-                records = (page[at : at + RECORD_BYTES] for at in range(0, len(page), RECORD_BYTES))
-                words = tuple(StopWord.of(document) for record in records if (document := decoded(record)) is not None)
+                words = words_in(page)
                 self._last = (page, words)
                 return words
             pause(0.001)
-        return (*(word for word in self._last[1] if word.id != DAMAGED.id), DAMAGED)
+        return (*words_in(page, leave_out_damaged=True), DAMAGED)
 
     def _write(self, word: StopWord) -> bool:
         """Write into the first free record; where none is free only a reason is lost: the bench is stopped."""
         with self._locked() as file:
             free: int | None = None
             for number in range(_FIRST, _FIRST + WORDS):
-                found = _document(file, number)
+                found = document_in(file, number)
                 if found is not None and found["id"] == word.id:
                     return True
                 if found is None and free is None:
@@ -269,7 +268,7 @@ class StopChannel:
     def _change_file(self, wanted: set[str], change: Callable[[StopWord], StopWord | None]) -> None:
         with self._locked() as file:
             for number in range(_FIRST, _FIRST + WORDS):
-                found = _document(file, number)
+                found = document_in(file, number)
                 if found is not None and found["id"] in wanted:
                     changed = None if found["id"] == DAMAGED.id else change(StopWord.of(found))
                     record = b"\0" * RECORD_BYTES if changed is None else encoded(changed.document())
@@ -280,14 +279,6 @@ class StopChannel:
         body = json.dumps(message).encode()
         sent = [send(self._folder, self._names[role], body) for role in roles]
         return any(sent)
-
-
-def _document(file: int, number: int) -> dict[str, Any] | None:
-    """The document in a record; one that is unreadable counts as damaged."""
-    try:
-        return read_record(file, number)
-    except Unreadable:
-        return {"id": DAMAGED.id}
 
 
 def _flocked(file: int) -> bool:

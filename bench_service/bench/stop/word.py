@@ -1,6 +1,6 @@
 """A stop request as the channel of a bench holds it, and the answer of worker and supervisor to it."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from datetime import datetime
 from typing import Any
 
@@ -45,8 +45,16 @@ class StopWord:
 
     @classmethod
     def of(cls, document: dict[str, Any]) -> "StopWord":
-        """Read a request from a document. Raises `TypeError`, `ValueError`, `KeyError` for any other document."""
-        given: dict[str, Any] = {**document, "at": datetime.fromisoformat(document["at"])}
+        """Read a request from a document; fields of a newer version are left out.
+
+        Raises `TypeError`, `ValueError`, `KeyError`, `AttributeError` for any other document.
+        """
+        at = datetime.fromisoformat(document["at"])
+        if at.tzinfo is None:
+            raise ValueError(f"at = {document['at']!r}: a time with its zone is expected")
+        known = {each.name for each in fields(cls)}
+        given: dict[str, Any] = {name: value for name, value in document.items() if name in known}
+        given["at"] = at
         return cls(**given)
 
 

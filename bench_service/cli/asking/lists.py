@@ -4,6 +4,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from bench_service.cli.asking.client import call
+from bench_service.cli.asking.moments import moment_of
 from bench_service.cli.options import wide
 
 if TYPE_CHECKING:
@@ -27,9 +28,11 @@ def everything(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
 
 def newest(client: "httpx.Client", path: str, most: int, conditions: dict[str, Any]) -> dict[str, Any]:
     """Return the newest items of a list that fulfil the conditions, as one page of any length; None is no condition.
-    Raises `Refused`.
+
+    `since` and `until` are moments as people type them. Raises `Refused` for others.
     """
-    query = {name: value for name, value in conditions.items() if value not in (None, [], "")}
+    moments = {name: moment_of(f"--{name}", conditions[name]) for name in ("since", "until") if name in conditions}
+    query = {name: value for name, value in {**conditions, **moments}.items() if value not in (None, [], "")}
     items: list[dict[str, Any]] = []
     while True:
         page = call(client, "GET", path, ("items",), params={**query, "limit": min(PAGE, max(1, most - len(items)))})

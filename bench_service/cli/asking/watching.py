@@ -9,7 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from bench_service.cli.asking.client import call
 from bench_service.cli.asking.retries import with_retries
 from bench_service.cli.options import notice
-from bench_service.wall_clock import pause
+from bench_service.wall_clock import monotonic_s, pause
 
 if TYPE_CHECKING:
     import httpx
@@ -22,8 +22,30 @@ LOOK_TIMEOUT_S = 15.0
 JOB = ("id", "procedure", "unit", "state", "verdict", "progress", "page", "result", "error")
 CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting", "reason", "warnings")
 """Fields of a job and of a campaign's run that commands read."""
+NEXT = "it is next"
+"""What a service says of a queued job that nothing holds: no reason to wait."""
+STANDS_S = 1.0
+"""Time for which a reason must stand before it is printed [s]: most are over with the next poll."""
 UNENDED = ("waiting", "running")
 """States of a batch's tasks that have not ended."""
+
+
+class _Reasons:
+    """Reasons why a job or run waits, each printed once when it has stood for a moment, also where there is no bar."""
+
+    def __init__(self, what: str) -> None:
+        self._what, self._reason, self._since_s, self._said = what, "", 0.0, ""
+
+    def look(self, reason: str | None) -> None:
+        """Take the present reason, empty or None where nothing waits, and print it where it is time to."""
+        now = "" if reason == NEXT else reason or ""
+        if now != self._reason:
+            self._reason, self._since_s = now, monotonic_s()
+        if not now:
+            self._said = ""
+        elif now != self._said and monotonic_s() - self._since_s >= STANDS_S:
+            self._said = now
+            notice(f"{self._what} waits: {now}")
 
 
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
@@ -34,12 +56,13 @@ def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict
     goes_on = f"The service has job {job['id']} and continues it: {page} shows it, `bench jobs` lists it"
     with _progress(console) as progress:
         bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1, doing="")
-        paused = False
+        paused, reasons = False, _Reasons(f"job {job['id']}")
         while job["state"] not in ENDED:
             if (job["state"] == "paused") > paused:
                 notice(f"job {job['id']} is paused: `bench job resume {job['id']}` continues it")
             paused = job["state"] == "paused"
             job = _looked_at(client, f"/api/v1/jobs/{job['id']}", JOB, goes_on)
+            reasons.look(None if job["state"] in ("paused", *ENDED) else job.get("waiting"))
             progress.update(bar, completed=job["progress"]["station"])
         if job["state"] == "succeeded":
             progress.update(bar, completed=job["progress"]["stations"] or 1)
@@ -58,12 +81,14 @@ def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console
     """
     with _progress(console) as progress:
         bar = progress.add_task(f"{run['campaign']} {run['unit']}", total=len(run["steps"]), doing="")
+        reasons = _Reasons(f"run {run['id']}")
         while True:
             ended = [step for step in run["steps"] if step["finished_at"] or step["state"] == "skipped"]
             now = next((s["name"] for s in run["steps"] if s["state"] in ("running", "paused")), "")
             progress.update(bar, completed=len(ended), doing=run["waiting"] or now)
             if run["state"] in ENDED:
                 return run
+            reasons.look(run["waiting"])
             run = _looked_at(client, f"/api/v1/campaign-runs/{run['id']}", CAMPAIGN_RUN, goes_on)
 
 

@@ -7,6 +7,7 @@ import typer
 
 from bench_service.cli.asking.client import call, connect, segment
 from bench_service.cli.asking.lists import newest, show
+from bench_service.cli.asking.moments import moment_of
 from bench_service.cli.options import AsJson, Limit, Server, console
 from bench_service.cli.refusal import Refused
 
@@ -37,7 +38,7 @@ def selection_of(where: list[str]) -> dict[str, Any]:
         elif name in selection:
             raise Refused(f"--where {name}: given twice; label and id may be repeated")
         else:
-            selection[name] = value
+            selection[name] = moment_of(f"--where {name} =", value) if name in ("since", "until") else value
     return selection
 
 

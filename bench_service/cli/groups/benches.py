@@ -144,7 +144,7 @@ def _only_stop(stops: list[dict[str, Any]], bench: str) -> str:
         return stops[0]["id"]
     if not stops:
         raise Refused(f"bench {bench} is not stopped: there is nothing to release")
-    named = "; ".join(f"{stop['id']}: {stop['reason']}" for stop in stops)
+    named = "; ".join(f"`bench release {stop['id']} --remark … --by …` ({stop['reason']})" for stop in stops)
     raise Refused(f"bench {bench} has several stops; name the one to release: {named}")
 
 

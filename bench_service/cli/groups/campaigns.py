@@ -1,6 +1,7 @@
 """``bench campaign`` and ``bench schedule``: acceptance in one command, with an exit code that a CI system can read."""
 
 import json
+from datetime import UTC
 from functools import partial
 from pathlib import Path
 from shlex import quote
@@ -11,6 +12,7 @@ import typer
 from bench_service.cli.asking.client import answer, call, connect, segment
 from bench_service.cli.asking.lists import everything, show
 from bench_service.cli.asking.retries import with_retries
+from bench_service.cli.asking.start_time import start_time
 from bench_service.cli.files import clear_place, whole_file
 from bench_service.cli.options import (
     NO_ITEMS,
@@ -152,20 +154,20 @@ def add_schedule(
     context: typer.Context,
     campaign: str,
     unit: Unit,
-    cron: Annotated[str, typer.Option(help="minute hour day month weekday, such as '0 1 * * *'")],
-    time_zone: Annotated[str, typer.Option(help="IANA name, such as Europe/Kyiv")],
+    cron: Annotated[str | None, typer.Option(help="minute hour day month weekday, such as '0 1 * * *'")] = None,
+    time_zone: Annotated[str | None, typer.Option(help="Such as Europe/Kyiv; of --at else this host's")] = None,
+    at: Annotated[str | None, typer.Option(help="Once, at this time: 22:30 or '2026-12-01 22:30'")] = None,
     bench: Bench = None,
     missed: Annotated[str, typer.Option(help="Missed starts: run_once or skip")] = "run_once",
     start_within_s: Annotated[float, typer.Option(help="Delay after which a start counts as missed [s]")] = 300.0,
     overlap: Annotated[str, typer.Option(help="Starts while the previous run is open: skip or queue")] = "skip",
     server: Server = None,
 ) -> None:
-    """Add a schedule by which a campaign starts by itself, repeatedly."""
+    """Add a schedule by which a campaign starts by itself: repeatedly (--cron), or once (--at)."""
     body = {
+        **_times(cron, time_zone, at),
         "campaign": campaign,
         "unit": unit,
-        "cron": cron,
-        "time_zone": time_zone,
         "bench": bench,
         "missed": missed,
         "start_within_s": start_within_s,
@@ -174,6 +176,16 @@ def add_schedule(
     with connect(context.obj, server, drive=False) as client:
         made = call(client, "POST", "/api/v1/schedules", ("id", "next_at"), json=body)
     console.print(f"schedule {made['id']}, next start {made['next_at']}", soft_wrap=True)
+
+
+def _times(cron: str | None, time_zone: str | None, at: str | None) -> dict[str, Any]:
+    """Times of a schedule by its options. Raises `Refused` where they are not one of the two kinds."""
+    if at is not None and cron is None:
+        once = start_time(at, time_zone).astimezone(UTC)
+        return {"cron": f"{once.minute} {once.hour} {once.day} {once.month} *", "time_zone": "UTC", "once": True}
+    if cron is None or time_zone is None or at is not None:
+        raise Refused("give --cron with --time-zone for repeated starts, or --at for one")
+    return {"cron": cron, "time_zone": time_zone}
 
 
 @schedules.command("list")

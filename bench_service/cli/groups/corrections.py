@@ -6,6 +6,7 @@ import typer
 
 from bench_service.cli.groups.decisions import By, Newest, Remark, UnitRecords
 from bench_service.cli.options import AsJson, Server
+from bench_service.cli.refusal import Refused
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -39,15 +40,25 @@ def corrections(
 def choose(
     context: typer.Context,
     unit: str,
-    correction_id: str,
+    correction_id: Annotated[str | None, typer.Argument(help="Id of the correction; none with --by-rule")] = None,
+    by_rule: Annotated[
+        str | None, typer.Option(help="Give this kind back to the rule: thermal, converter, thermometers, gyros")
+    ] = None,
     by: By = None,
     remark: Remark = "",
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Make a correction the one of its kind that new jobs use; one of a result that failed needs a remark."""
-    path = RECORDS.path(unit, correction_id, "current")
-    RECORDS.post(context, path, {"by": by, "remark": remark}, server, as_json)
+    body: dict[str, Any] = {"by": by, "remark": remark}
+    if (correction_id is None) == (by_rule is None):
+        raise Refused("exactly one of CORRECTION_ID and --by-rule KIND is needed")
+    if by_rule is not None:
+        body["kind"] = by_rule
+        path = RECORDS.path(unit, "choose-by-rule")
+    else:
+        path = RECORDS.path(unit, correction_id or "", "current")
+    RECORDS.post(context, path, body, server, as_json)
 
 
 RECORDS.add_approve_and_reject(correction)

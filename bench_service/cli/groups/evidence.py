@@ -15,8 +15,8 @@ from bench_service.cli.options import NO_ITEMS, AsJson, Limit, Server, Set, cons
 
 Labelled = Annotated[list[str], typer.Option("--label", help="Only of jobs with name or name=text; may be repeated")]
 Verdict = Annotated[str | None, typer.Option(help="pass, fail or error")]
-Since = Annotated[str | None, typer.Option(help="Created at this time or later: 2026-11-30T08:00:00Z")]
-Until = Annotated[str | None, typer.Option(help="Created before this time")]
+Since = Annotated[str | None, typer.Option(help="Created at this time, date or later, or so long ago: 2026-11-30, 7d")]
+Until = Annotated[str | None, typer.Option(help="Created before; as --since")]
 Text = Annotated[str | None, typer.Option(help="In an id, a name, a label or the name of an imported file")]
 
 

@@ -10,12 +10,14 @@ import typer
 
 from bench_service.cli.asking.client import call, connect
 from bench_service.cli.files import text_of
-from bench_service.cli.options import Server, console, errors
+from bench_service.cli.options import AsJson, Server, console, errors
 from bench_service.cli.refusal import Refused
 
 if TYPE_CHECKING:
     import httpx
 
+RECORDING = ("id", "unit", "count", "channels", "rate_hz", "duration_s", "warnings")
+"""Fields of a recording that the command reads."""
 PROPOSAL = ("description", "unknown", "suspicious", "notes")
 """Fields of a proposal that the command reads."""
 
@@ -32,6 +34,7 @@ def import_(
     table: Annotated[str | None, typer.Option(help="Topic, message type, archive's file")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Take a proposed description in which nothing is unknown")] = False,
     server: Server = None,
+    as_json: AsJson = False,
 ) -> None:
     """Import a recorded file, or several that are columns of one recording.
 
@@ -51,7 +54,12 @@ def import_(
                 return
             _confirm(proposal, yes)
         recording = _import(client, files, text)
-    console.print_json(json.dumps(recording))
+    if as_json:
+        print(json.dumps(recording, indent=2))
+    else:
+        from bench_service.cli.printing.tables import recording_line
+
+        console.print(recording_line(recording), soft_wrap=True)
     for warning in recording["warnings"]:
         errors.print(f"warning: {warning}", soft_wrap=True)
 
@@ -69,7 +77,7 @@ def _import(client: "httpx.Client", files: list[Path], text: str) -> Any:
     with ExitStack() as closing:
         opened = [(path.name, closing.enter_context(path.open("rb"))) for path in files]
         parts = [("files", (name, file, "application/octet-stream")) for name, file in opened]
-        return call(client, "POST", "/api/v1/recordings", ("id", "warnings"), files=parts, data={"description": text})
+        return call(client, "POST", "/api/v1/recordings", RECORDING, files=parts, data={"description": text})
 
 
 def _show(proposal: Any) -> None:

@@ -7,6 +7,7 @@ import typer
 
 from bench_service.cli.asking.client import RESULT, call, connect
 from bench_service.cli.asking.lists import newest
+from bench_service.cli.asking.start_time import start_time
 from bench_service.cli.completion import procedure_names
 from bench_service.cli.options import (
     NO_ITEMS,
@@ -45,6 +46,7 @@ def run(
     retries: Annotated[int, typer.Option(min=0, max=5, help="After faults of the bench")] = 0,
     reservation: Annotated[str | None, typer.Option(help="The reservation under which it runs")] = None,
     mounting: Annotated[str | None, typer.Option(help="The unit's mounting; default: the one in place")] = None,
+    at: Annotated[str | None, typer.Option(help="Not before this time: 22:30 or '2026-12-01 22:30'")] = None,
     key: Key = None,
     by: By = None,
     no_wait: Annotated[bool, typer.Option("--no-wait", help="Queue it and end; a service or worker runs it")] = False,
@@ -65,6 +67,7 @@ def run(
         "retries": retries,
         "reservation": reservation,
         "mounting": mounting,
+        **({} if at is None else {"not_before": start_time(at).isoformat()}),
     }
     headers = {"Idempotency-Key": key_or_new(key), **named(by)}
     settings = of_bench(context.obj, bench) if server is None else context.obj
@@ -124,8 +127,10 @@ def jobs(
     unit: Annotated[str | None, typer.Option(help="Only jobs of this unit")] = None,
     bench: Annotated[str | None, typer.Option(help="Only jobs of this bench")] = None,
     verdict: Annotated[str | None, typer.Option(help="pass, fail or error")] = None,
-    since: Annotated[str | None, typer.Option(help="Created at this time or later: 2026-11-30T08:00:00Z")] = None,
-    until: Annotated[str | None, typer.Option(help="Created before this time")] = None,
+    since: Annotated[
+        str | None, typer.Option(help="Created at this time, date or later, or so long ago: 2026-11-30, 7d")
+    ] = None,
+    until: Annotated[str | None, typer.Option(help="Created before; as --since")] = None,
     label: Annotated[list[str], typer.Option(help="name or name=text; may be repeated")] = NO_ITEMS,
     text: Annotated[str | None, typer.Option(help="In an id, a name or a label")] = None,
     limit: Limit = 20,

@@ -1,6 +1,7 @@
 """``bench serve``, ``demo`` and ``openapi``: the service itself, a demonstration of it, and its document."""
 
 import sys
+import threading
 from typing import Annotated, Any
 
 import typer
@@ -56,17 +57,23 @@ def demo(
     settings = _with(context.obj, port=port)
     check_port(settings)
     address = f"http://{settings.host}:{settings.port}"
+    driving = threading.Event()
     with (
-        ending_like_ctrl_c(),
+        ending_like_ctrl_c() as nothing_interrupts,
+        accompanied(settings, driving.is_set),  # outside: the supervisor ends once the bench is safe and left
         serving(settings),
-        accompanied(settings, lambda: True),
         connect(settings, address, drive=False) as client,
     ):
-        console.print(f"bench {settings.bench_id} at {address}")
-        code = demonstrate(client, unit, seed, console)
-        if not once:
-            console.print(f"serving on {address} (API: {address}/docs); Ctrl-C ends", soft_wrap=True)
-            _until_interrupted()
+        driving.set()
+        try:
+            console.print(f"bench {settings.bench_id} at {address}")
+            code = demonstrate(client, unit, seed, console)
+            if not once:
+                console.print(f"serving on {address} (API: {address}/docs); Ctrl-C ends", soft_wrap=True)
+                _until_interrupted()
+        finally:
+            nothing_interrupts()
+            driving.clear()
     return code
 
 
@@ -81,8 +88,6 @@ def _with(settings: Settings, **given: Any) -> Settings:
 
 
 def _until_interrupted() -> None:
-    import threading
-
     try:
         threading.Event().wait()
     except KeyboardInterrupt:

@@ -15,7 +15,8 @@ def run_table(run: dict[str, Any]) -> Table:
     )
     for step in run["steps"]:
         bad = [c["name"] for c in step["checks"] if not c["passed"]]
-        missed = f"missed: {', '.join(bad)}" if bad else ""
+        failed = [c["name"] for c in step["checks"] if not c["passed"] and not c.get("bound", False)]
+        missed = f"missed: {', '.join(failed)}" if failed else ""
         told = "\n".join(filter(None, [step["reason"], missed, *step["warnings"]]))
         passed = f"{len(step['checks']) - len(bad)}/{len(step['checks'])}"
         table.add_row(step["name"], step["does"], step["state"], _verdict(step["verdict"]), passed, told)
@@ -46,7 +47,8 @@ def schedule_table(items: list[dict[str, Any]]) -> Table:
     table = _table("schedule", "campaign", "unit", "cron", "zone", "next, UTC", "last outcome")
     for one in items:
         next_at = (one["next_at"] or "off")[:16].replace("T", " ")
-        row = (one["id"], one["campaign"], one["unit"], one["cron"], one["time_zone"], next_at)
+        times = ("once", "") if one.get("once") else (one["cron"], one["time_zone"])
+        row = (one["id"], one["campaign"], one["unit"], *times, next_at)
         table.add_row(*row, one["last_outcome"])
     return table
 

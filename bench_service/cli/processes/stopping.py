@@ -6,6 +6,7 @@ that watches the channel acts, and where no process does, the devices are made s
 
 import argparse
 import getpass
+import os
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -79,26 +80,49 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
     Of the environment it reads what it needs: a setting that another command would refuse does not keep a stop out.
     """
     parser = argparse.ArgumentParser(prog="bench stop", description=HELP)
-    parser.add_argument("--bench", default=_own(environ), help="default: the one in the settings")
+    parser.add_argument("--bench", help="default: the one in the settings")
     parser.add_argument("--reason", default=REASON, help="for the person who releases it")
     parser.add_argument("--wait", type=float, default=WAIT_S, metavar="SECONDS", help="until it is safe")
     try:
         given = parser.parse_args(list(arguments))
     except SystemExit as ended:
         return REFUSED if ended.code else SAFE
-    if not NAME.fullmatch(given.bench):
-        print(f"bench: --bench {given.bench}: small letters, digits, - and _ are expected", file=sys.stderr)
-        return REFUSED
     folder = environ.get("BENCH_DEVICE_FOLDER")
     where = device_folder(environ.get("BENCH_DATABASE_URL", DATABASE_URL), None if folder is None else Path(folder))
-    return stop_here(given.bench, where, given.reason or REASON, given.wait, _say)
+    bench = given.bench or _own(environ, where)
+    if bench is None:
+        there = ", ".join(_benches(where)) or "none"
+        print(
+            f"bench: NOTHING IS STOPPED: the bench file {environ['BENCH_FILE']} does not tell which bench this is: "
+            f"name it with --bench; in {where.absolute()} are: {there}",
+            file=sys.stderr,
+        )
+        return REFUSED
+    if not NAME.fullmatch(bench):
+        print(f"bench: --bench {bench}: small letters, digits, - and _ are expected", file=sys.stderr)
+        return REFUSED
+    return stop_here(bench, where, given.reason or REASON, given.wait, _say)
 
 
-def _own(environ: Mapping[str, str]) -> str:
-    """The bench of the settings: by its id, or by its bench file."""
-    file = environ.get("BENCH_FILE")
-    named = None if file is None else bench_id_in(Path(file))
-    return environ.get("BENCH_ID", named or BENCH_ID)
+def _own(environ: Mapping[str, str], folder: Path) -> str | None:
+    """The bench of the settings: by its id, or by its bench file; None where that file cannot be read.
+
+    The only bench of the folder then: the default one would be another bench, which is stopped and reported as safe
+    while this one moves.
+    """
+    if "BENCH_ID" in environ:
+        return environ["BENCH_ID"]
+    if "BENCH_FILE" not in environ:
+        return BENCH_ID
+    named, there = bench_id_in(Path(environ["BENCH_FILE"])), _benches(folder)
+    return named or (there[0] if len(there) == 1 else None)
+
+
+def _benches(folder: Path) -> list[str]:
+    """The benches whose devices were ever driven from a folder of this host."""
+    with suppress(OSError):
+        return sorted(name[6:-8] for name in os.listdir(folder) if re.fullmatch(r"bench-.+\.devices", name))
+    return []
 
 
 def _say(line: str) -> None:
@@ -115,7 +139,7 @@ def _person() -> str:
 
 def _known(folder: Path, bench: str) -> bool:
     """Return whether the bench's devices were ever driven from this host."""
-    return (folder / f"bench-{bench}.devices").exists()
+    return os.path.exists(folder / f"bench-{bench}.devices")  # unlike `Path.exists`, false for another's folder
 
 
 def _make_safe(folder: Path, bench: str) -> tuple[bool, str]:

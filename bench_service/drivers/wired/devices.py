@@ -5,7 +5,7 @@ that is safe by it gets no command. Simulated devices of a mixed bench live in t
 only the register.
 """
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from typing import Any
 
@@ -120,9 +120,9 @@ class WiredDevices:
             if device in unsafe and device not in real:
                 link.note(f"{device}.make_safe", {}, **SAFE_STATE[device](link.state))
         kinds: list[Kind] = [kind for kind in SAFE if kind in unsafe and kind in real]
-        devices = opened(file, kinds, context_of(file))
+        context = context_of(file)
         work: dict[Kind, Callable[[], Coroutine[Any, Any, None]]] = {
-            kind: partial(_led_to_safety, device) for kind, device in devices.items()
+            kind: partial(_led_to_safety, partial(opened, file, (kind,), context), kind) for kind in kinds
         }
         failures: dict[Kind, Exception] = {}
 
@@ -133,11 +133,13 @@ class WiredDevices:
                 failures[kind] = outcome
                 link.note(f"{kind}.make_safe.failed", {"error": f"{type(outcome).__name__}: {outcome}"})
 
-        in_parallel(work, {kind: _deadline_s(real[kind]) for kind in devices}, done)
+        in_parallel(work, {kind: _deadline_s(real[kind]) for kind in kinds}, done)
         return [_of_device(kind, failures[kind]) for kind in kinds if kind in failures]
 
 
-async def _led_to_safety(device: Any) -> None:
+async def _led_to_safety(make: Callable[[], Mapping[Kind, Any]], kind: Kind) -> None:
+    """Make a device by its driver and lead it to safety, in its own thread: what fails here is its own failure."""
+    device = make()[kind]
     try:
         await device.connect()
         await device.make_safe()

@@ -75,6 +75,7 @@ class BenchFileDriver:
         self._asking = asking
         self._units = read_units(file.folder / "units")
         self._found: dict[Kind, Found] = {}
+        self._told: set[str] = set()
         self._devices = WiredDevices(lambda: file, register)
         self._description = described(file, simulated.description)
         for kind, failure in self._look().items():
@@ -117,6 +118,11 @@ class BenchFileDriver:
             link.close()
             raise
 
+    def warm_up(self) -> None:
+        """Load what a simulated unit needs, where the bench file has one."""
+        if self._file.within("unit_link"):
+            self._simulated.warm_up()
+
     def _need_devices(self, needs: BenchNeeds) -> None:
         before = dict(self._found)
         failures = self._look()
@@ -138,7 +144,9 @@ class BenchFileDriver:
         found = survey(self._file)
         self._found |= found.found
         for sentence in found.limits_said(self._file):
-            log.warning("bench %s: %s", self._file.id, sentence)
+            if sentence not in self._told:  # it is asked before each job, and differs but rarely
+                log.warning("bench %s: %s", self._file.id, sentence)
+            self._told.add(sentence)
         self._description = described(self._file, self._simulated.description, self._found)
         return found.failures
 

@@ -144,7 +144,10 @@ def _rule(document: dict[str, Any]) -> str:
 def _checks(checks: list[dict[str, Any]]) -> PrintedTable:
     rows = tuple(_check(c) for c in sorted(checks, key=lambda c: c["passed"]))
     columns = ("", "check", "value", "U", "k", "limit", "unit", "note")
-    note = "U = k·u is the expanded uncertainty; values have its second digit. Conditional: within U of the limit."
+    note = (
+        "U = k·u is the expanded uncertainty; values have its second digit. Conditional: within U of the limit. "
+        "Inconclusive: nothing was observed, and what it stays below is outside the limit."
+    )
     return PrintedTable("Checks", columns, rows, (2, 3, 4), note)
 
 
@@ -159,12 +162,12 @@ def _check(c: dict[str, Any]) -> tuple[str, ...]:
     return (
         decision.get("outcome") or ("pass" if c["passed"] else "fail"),
         c["name"],
-        to_uncertainty(c["value"], expanded),
+        ("< " if c.get("bound") else "") + to_uncertainty(c["value"], expanded),
         "–" if expanded is None else two_digits(expanded),
         "–" if expanded is None else f"{factor:.3g}",
         " and ".join(bounds),
         limit["unit"],
-        c.get("note", ""),
+        "; ".join(filter(None, (c.get("note", ""), limit.get("source") and f"limit: {limit['source']}"))),
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from bench_service.formats.bounds import listed, quoted
 from bench_service.formats.logs.table import LogColumn, LogTable
 from procedures.core.recording import ACCELEROMETER, GYRO
 
@@ -12,6 +13,14 @@ MOST_CHANNELS = 16
 def chosen_table(tables: Sequence[LogTable]) -> LogTable:
     """Return the table with the most axes; of equal ones by doubts, clock, rank, length."""
     return max(tables, key=lambda t: (_axes(t), -_doubts(t), bool(t.clocks), t.rank, t.rows or 0))
+
+
+def other_tables(chosen: LogTable, tables: Sequence[LogTable]) -> list[str]:
+    """Say which other tables hold a triad: another unit's, another instance's, or that which the chosen one lacks."""
+    others = [t.name for t in tables if t.name != chosen.name and _axes(t) >= len(GYRO)]
+    if not others:
+        return []
+    return [f"this is table {quoted(chosen.name)}; gyros or accelerometers are also in {listed(others)}: give table"]
 
 
 def _axes(table: LogTable) -> int:

@@ -13,7 +13,7 @@ from bench_service.formats.joined_files import Opened
 from bench_service.formats.logs.registry import format_of
 from bench_service.formats.logs.table import LogColumn, LogTable, find_table
 from bench_service.formats.own_export import OwnExport, own_export
-from bench_service.formats.proposal.choice import chosen_columns, chosen_table, missing_axes
+from bench_service.formats.proposal.choice import chosen_columns, chosen_table, missing_axes, other_tables
 from bench_service.formats.proposal.inspection import Values, inspected, values_of
 from bench_service.formats.proposal.model import InspectedClock, Proposal, ProposedColumn, ProposedTable
 from bench_service.formats.proposal.of_tables import Table, table_of
@@ -108,7 +108,7 @@ def _proposed(
         f"{c.column!r}: {words}" for c in clocks for words in (c.warnings if c.problem is None else [c.problem])
     ]
     suspicious += _other_rate(table, rate_hz)
-    notes += _left_out(looked, columns)
+    notes += [*_left_out(looked, columns), *other_tables(table, tables)]
     if np.any(values.finite < values.rows):
         timed["gaps"] = "mark"
     if "time_column" not in timed and rate_hz is not None:

@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow import csv
 
+from bench_service.formats.chunk import arrow_array
 from bench_service.formats.samples_out.mcap_file import mcap
 from bench_service.formats.samples_out.sheet import Sheet
 from procedures.core.errors import BadParameter
@@ -66,7 +67,7 @@ def _schema(sheet: Sheet) -> Any:
 
 def _batches(sheet: Sheet, schema: Any) -> Iterator[Any]:
     for block in sheet.blocks:
-        yield pa.RecordBatch.from_arrays([pa.array(column) for column in block], schema=schema)
+        yield pa.RecordBatch.from_arrays([arrow_array(column) for column in block], schema=schema)
 
 
 def _csv(sheet: Sheet) -> Iterator[bytes]:

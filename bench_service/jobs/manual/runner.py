@@ -10,7 +10,7 @@ from threading import Event, Lock
 from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
-from bench_service.bench.make_safe import RoadEnd, over_new_link, whole_road
+from bench_service.bench.make_safe import RoadEnd, has_register, over_new_link, still_unsafe, whole_road
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.worker_patience import ENDING_S
 from bench_service.jobs.manual.reader import LeaseReader
@@ -67,7 +67,7 @@ class ManualRunner:
         if lease.began_at is not None:
             obstacle = None if self._driver.device_state() is None else over_new_link(self._driver, self._by)
             because = f"its process, {lease.process}, ended or lost its database"
-            self._ended(lease, because, None if obstacle is None else obstacle.why)
+            self._ended(lease, because, None if obstacle is None else obstacle.reason)
             return True
         if not lease.live(now()) or self._stopped():
             why = "the bench is stopped" if self._stopped() else "its time had ended before it began"
@@ -95,7 +95,7 @@ class ManualRunner:
         session.stop()
         if (reader := self._reader) is not None:
             reader.end_delivery()
-        if self._driver.device_state() is not None:  # else the session's own link is the only one
+        if has_register(self._driver):  # else the session's own link is the only one
             self._whole_road(session)
 
     def shut_down(self) -> None:
@@ -140,7 +140,7 @@ class ManualRunner:
             end = self._whole_road(session)
             reader.end(WRITE_S)
         detour = f"; made safe over a new link: {end.detour}" if end.detour else ""
-        self._ended(lease, because + detour, None if end.obstacle is None else end.obstacle.why)
+        self._ended(lease, because + detour, None if end.obstacle is None else end.obstacle.reason)
         if ending:
             raise ShuttingDown
 
@@ -152,30 +152,17 @@ class ManualRunner:
         with self._road:
             return whole_road(session, self._driver, self._by, given_back)
 
-    def _read_back(self) -> str | None:
-        """The reason why the devices' register does not say that they are safe; None: it does, or there is none.
-
-        It is read once nothing of the lease can reach a device. Devices that are not safe then, though the way to
-        safety ended well, are made safe over a new link; the bench is stopped all the same, as nobody knows the cause.
-        """
-        state = self._driver.device_state()
-        if state is None or state.safe:
-            return None
-        obstacle = over_new_link(self._driver, self._by)
-        then = "a new link has made it safe since" if obstacle is None else obstacle.why
-        return f"at the end of manual mode {' and '.join(state.unsafe)}; {then}"
-
     def _ended(self, lease: ManualLease, because: str, unsafe: str | None) -> None:
         """Note the end of a lease; where the bench is not safe it is stopped. What is not noted now is closed later.
 
-        It is noted as safe only where the devices' register says so now.
+        `unsafe`: the reason of that stop, whose subject is the bench. It is noted as safe only where the devices'
+        register says so now.
         """
-        unsafe = self._read_back() if unsafe is None else unsafe
+        unsafe = still_unsafe(self._driver, self._by, "manual mode") if unsafe is None else unsafe
         log.info("manual mode of bench %s has ended: %s", lease.bench, because)
         if unsafe is not None:
-            log.error("bench %s could not be made safe: %s", lease.bench, unsafe)
-            reason = f"could not be made safe: {unsafe}"
-            self._stores.benches.stop_bench_once(BenchStop(lease.bench, now(), reason, by=self._by))
+            log.error("bench %s %s", lease.bench, unsafe)
+            self._stores.benches.stop_bench_once(BenchStop(lease.bench, now(), unsafe, by=self._by))
         self._stores.manual.end(lease.id, now(), because, unsafe is None)
         target = f"/api/v1/benches/{lease.bench}/manual/{lease.id}"
         record(self._trail, self._by, "manual_ended", target, "noted", because=because, safe=unsafe is None)

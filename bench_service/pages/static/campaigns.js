@@ -3,6 +3,7 @@ import { ask, part, read, send } from "./api.js";
 import { busy, verb } from "./act.js";
 import { CampaignForm } from "./campaign_form.js";
 import { fill, h, span } from "./dom.js";
+import { onceAt } from "./once.js";
 import { t } from "./words.js";
 
 const place = document.getElementById("campaign"), zone = Intl.DateTimeFormat().resolvedOptions().timeZone;
@@ -23,11 +24,13 @@ function start(name) {
     if (found) fill(seen, h("p", {}, found.duration_s !== undefined ? `${span(found.duration_s)} ${t("of bench time")}` : ""), ...(found.warnings || []).map((text) => h("p", { class: "warning" }, text)),
       h("ul", {}, ...(found.steps || []).map((step) => h("li", {}, `${step.name}${step.duration_s !== undefined && step.duration_s !== null ? `: ${span(step.duration_s)}` : ""} ${(step.warnings || []).join(" ")}`))));
   });
-  const form = h("form", {}, h("h2", {}, `${t("Start")} ${name}`), h("div", { class: "filters" }, ...on.labels, look, go, output), seen);
+  const day = h("input", { type: "datetime-local" });
+  const form = h("form", {}, h("h2", {}, `${t("Start")} ${name}`), h("div", { class: "filters" }, ...on.labels, h("label", {}, t("Start at; empty: as soon as the bench is free"), day), look, go, output), seen);
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const run = await busy(go, output, () => send(`/api/v1/campaigns/${part(name)}/runs`, on.values(), { key: crypto.randomUUID() }));
-    if (run) location.href = `/campaign-runs/${run.id}`;
+    const key = crypto.randomUUID(), made = await busy(go, output, async () => day.value ? send("/api/v1/schedules", { ...onceAt(day.value), campaign: name, ...on.values() }, { key }) : send(`/api/v1/campaigns/${part(name)}/runs`, on.values(), { key }));
+    if (made && day.value) location.reload();
+    else if (made) location.href = `/campaign-runs/${made.id}`;
   });
   open(form);
 }
@@ -39,19 +42,24 @@ function edit(campaign, fresh) {
 }
 
 const WEEKDAY = new Intl.DateTimeFormat(document.documentElement.lang, { weekday: "long", timeZone: "UTC" });
-const HOW_OFTEN = [["* * *", t("every day")], ["* * 1-5", t("from Monday to Friday")], ...[1, 2, 3, 4, 5, 6, 0].map((day) => [`* * ${day}`, WEEKDAY.format(new Date(Date.UTC(2024, 0, 7 + day)))]), ["1 * *", t("on the first of each month")], ["", t("by a cron line")]];
+const HOW_OFTEN = [["* * *", t("every day")], ["* * 1-5", t("from Monday to Friday")], ...[1, 2, 3, 4, 5, 6, 0].map((day) => [`* * ${day}`, WEEKDAY.format(new Date(Date.UTC(2024, 0, 7 + day)))]), ["1 * *", t("on the first of each month")], ["once", t("once")], ["", t("by a cron line")]];
 
 function schedule(name) {
   const on = target(), output = h("output", { role: "alert" }), often = h("select", {}, ...HOW_OFTEN.map(([value, text]) => h("option", { value }, text))), time = h("input", { type: "time", value: "01:00", required: true });
-  const cron = h("input", { name: "cron", value: "0 1 * * *" }), where = h("input", { name: "zone", required: true, value: zone }), cronLabel = h("label", { hidden: true }, t("Minute hour day month weekday"), cron), timeLabel = h("label", {}, t("At"), time);
+  const cron = h("input", { name: "cron", value: "0 1 * * *" }), where = h("input", { name: "zone", required: true, value: zone }), day = h("input", { type: "datetime-local" }), dayLabel = h("label", { hidden: true }, t("Start at"), day), zoneLabel = h("label", {}, t("Time zone"), where), cronLabel = h("label", { hidden: true }, t("Minute hour day month weekday"), cron), timeLabel = h("label", {}, t("At"), time);
   const missed = h("select", {}, h("option", { value: "run_once" }, t("one run makes up for it")), h("option", { value: "skip" }, t("it is left out"))), overlap = h("select", {}, h("option", { value: "skip" }, t("the new start is left out")), h("option", { value: "queue" }, t("the new one waits")));
-  often.addEventListener("change", () => { cronLabel.hidden = often.value !== ""; timeLabel.hidden = often.value === ""; });
-  const line = () => { if (often.value === "") return cron.value; const [hour, minute] = time.value.split(":").map(Number); return `${minute} ${hour} ${often.value}`; };
-  const form = h("form", {}, h("h2", {}, `${t("Schedule")} ${name}`), h("div", { class: "filters" }, h("label", {}, t("How often"), often), timeLabel, cronLabel, h("label", {}, t("Time zone"), where), ...on.labels,
+  often.addEventListener("change", () => { cronLabel.hidden = often.value !== ""; timeLabel.hidden = ["", "once"].includes(often.value); dayLabel.hidden = often.value !== "once"; zoneLabel.hidden = often.value === "once"; });
+  const times = () => {
+    if (often.value === "once") return onceAt(day.value);
+    if (often.value === "") return { cron: cron.value, time_zone: where.value };
+    const [hour, minute] = time.value.split(":").map(Number);
+    return { cron: `${minute} ${hour} ${often.value}`, time_zone: where.value };
+  };
+  const form = h("form", {}, h("h2", {}, `${t("Schedule")} ${name}`), h("div", { class: "filters" }, h("label", {}, t("How often"), often), timeLabel, dayLabel, cronLabel, zoneLabel, ...on.labels,
     h("label", {}, t("Where a start was missed"), missed), h("label", {}, t("While the run before is open"), overlap), h("button", { class: "go" }, t("Schedule")), output));
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const made = await busy(form.querySelector("button"), output, () => send("/api/v1/schedules", { cron: line(), time_zone: where.value, campaign: name, missed: missed.value, overlap: overlap.value, ...on.values() }, { key: crypto.randomUUID() }));
+    const made = await busy(form.querySelector("button"), output, async () => send("/api/v1/schedules", { ...times(), campaign: name, missed: missed.value, overlap: overlap.value, ...on.values() }, { key: crypto.randomUUID() }));
     if (made) location.reload();
   });
   open(form);

@@ -43,6 +43,9 @@ const ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;
 const LOCAL = new Intl.DateTimeFormat("sv-SE", { dateStyle: "short", timeStyle: "medium" });
 const NAMED = new Intl.DateTimeFormat(undefined, { timeZoneName: "short" });
 
+/** Time of day as in `moment`. */
+export const clock = (at) => at.toLocaleTimeString("sv-SE", { hour: "2-digit", minute: "2-digit", second: "2-digit", timeZoneName: "short" });
+
 /** Local time with its zone named; UTC is in the tooltip. */
 export function moment(iso) {
   if (!iso) return "–";

@@ -2,7 +2,7 @@
 import { h } from "./dom.js";
 import { t } from "./words.js";
 
-const UNITS = [["_deg_per_sqrt_h", "deg/√h"], ["_arcsec", "″"], ["_deg_h", "deg/h"], ["_deg_s", "deg/s"], ["_m_s2", "m/s²"], ["_c_min", "°C/min"], ["_hz", "Hz"], ["_ppm", "ppm"], ["_deg", "°"], ["_ma", "mA"], ["_min", "min"], ["_ug", "µg"], ["_mg", "mg"], ["_nt", "nT"], ["_v", "V"], ["_c", "°C"], ["_s", "s"], ["_h", "h"], ["_m", "m"]];
+const UNITS = [["_deg_per_sqrt_h", "deg/√h"], ["_deg_sqrt_h", "deg/√h"], ["_ug_sqrt_s", "µg·√s"], ["_codes_per_c", "codes/°C"], ["_rad_s", "rad/s"], ["_deg_s2", "deg/s²"], ["_c_s2", "°C/s²"], ["_c_s", "°C/s"], ["_ms", "ms"], ["_arcsec", "″"], ["_deg_h", "deg/h"], ["_deg_s", "deg/s"], ["_m_s2", "m/s²"], ["_c_min", "°C/min"], ["_hz", "Hz"], ["_ppm", "ppm"], ["_deg", "°"], ["_ma", "mA"], ["_ug", "µg"], ["_mg", "mg"], ["_nt", "nT"], ["_v", "V"], ["_c", "°C"], ["_s", "s"], ["_h", "h"], ["_m", "m"]];
 
 export function unitOf(name) {
   const found = UNITS.find(([end]) => name.endsWith(end));
@@ -14,6 +14,9 @@ export function plainName(name) {
   const words = stem.replaceAll("_", " ");
   return t(words.charAt(0).toUpperCase() + words.slice(1));
 }
+
+/** A description for a person: what a program calls None or null is a field left empty. */
+const plain = (description) => t(description).replace(/\b(?:None|null)(?=:)/g, t("empty"));
 
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
@@ -45,7 +48,7 @@ class Field {
     this.kind = kindOf(schema, whole);
     this.standard = this.kind.default === undefined ? null : this.kind.default;
     const name = path[path.length - 1], id = `field-${prefix}${path.join("-")}`, unit = unitOf(name), range = bounds(this.kind);
-    const describe = [this.kind.description && t(this.kind.description), range && t("allowed: {range}", { range: `${range} ${unit}`.trim() })].filter(Boolean).join("; ");
+    const describe = [this.kind.description && plain(this.kind.description), range && t("allowed: {range}", { range: `${range} ${unit}`.trim() })].filter(Boolean).join("; ");
     this.input = this.control(id);
     this.message = h("span", { class: "message", role: "alert" });
     this.back = h("button", { type: "button", class: "quiet", hidden: true, "aria-label": t("Back to the default of {name}", { name: plainName(name) }), onclick: () => { this.set(this.standard); changed(); } }, "↺");

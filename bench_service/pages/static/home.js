@@ -49,10 +49,10 @@ function show({ bench, job }) {
   const { safety } = bench, free = !job && !["busy", "manual"].includes(bench.state);
   fill(card.querySelector(".state"),
     h("p", {}, badge(bench.state), " ", job
-      ? [t("Busy with"), " ", h("a", { href: job.page, title: job.procedure }, titled(job.procedure)), ` ${t("on")} `, h("a", { href: `/units/${part(job.unit)}` }, job.unit), ` (#${job.number}). `,
-        progress ? `${progress.label}. ${t("Left:")} ${span(progress.eta_s)} ${t("of bench time")}, ${span(progress.eta_wall_s)} ${t("of real time")}.` : ""]
+      ? [t("Busy with"), " ", h("a", { href: job.page, title: job.procedure }, titled(job.procedure)), ` ${t("on")} `, h("a", { href: `/units/${part(job.unit)}` }, job.unit), ` (#${job.number}). `, job.prompt ? `${t("It waits for a person.")} ` : "",
+        progress ? `${progress.label}. ${t("Left:")} ${span(progress.eta_s)} ${t("of bench time")}${progress.eta_wall_s === null ? "" : `, ${span(progress.eta_wall_s)} ${t("of real time")}`}.` : ""]
       : bench.state === "manual" ? h("a", { href: `/benches/${part(bench.id)}/manual` }, t("In manual mode."))
-      : bench.driven_by ? t("Idle.") : t("No worker drives it now: its jobs wait."), bench.queued ? [" ", h("a", { href: "/queue" }, `${bench.queued} ${t("queued")}`), "."] : ""),
+      : bench.driven_by ? (bench.state === "stopped" ? t("Nothing runs; jobs wait until the stop is released.") : t("Idle.")) : t("No worker drives it now: its jobs wait."), bench.queued ? [" ", h("a", { href: "/queue" }, `${bench.queued} ${t("queued")}`), "."] : ""),
     job && h("progress", { max: 1, value: progress ? progress.fraction : job.progress.fraction, "aria-label": t("Progress") }),
     h("p", { class: safety.safe !== true && free ? "warning" : "note" }, job && !bench.stops.length && safety.safe === false
       ? `${t("It is in use:")} ${safety.devices.unsafe.join(", ")}.` : safety.explanation),

@@ -20,6 +20,14 @@ async function firstRows(file) {  // of a text file, as it is
   return lines.map((line) => line.split(line.includes(";") ? ";" : line.includes("\t") ? "\t" : line.includes(",") ? "," : /\s+/));
 }
 
+const triadOf = (one) => `${one.channel().replace(/_?[xyz]$/i, "")} ${one.quantity()}`;
+
+/** The other channels of a triad take the unit that one of them was given, unless they were given theirs by hand. */
+function triadFollows(changed, before) {
+  changed.touched = true;
+  for (const { own } of rows) if (own !== changed && !own.touched && triadOf(own) === triadOf(changed) && own.unit() === before) own.take(changed.unit());
+}
+
 /** A column of the file: whether it is imported, as which channel, in which unit. */
 function row(channel, known, used) {
   const name = (text) => `${text} ${channel.name || channel.column}`;
@@ -28,9 +36,12 @@ function row(channel, known, used) {
   const units = () => { const list = UNITS[quantity.value] || []; unit.replaceChildren(...options(channel.unit && !list.includes(channel.unit) && quantity.value === channel.quantity ? [channel.unit, ...list] : list, channel.unit)); };
   quantity.addEventListener("change", () => { units(); write(); });
   units();
-  for (const input of [use, as, unit, scale]) input.addEventListener("change", write);
+  for (const input of [use, as, scale]) input.addEventListener("change", write);
+  const own = { touched: false, proposed: channel.unit, channel: () => as.value.trim(), quantity: () => quantity.value, unit: () => unit.value,
+    names: [channel.name, channel.column].filter((one) => typeof one === "string" && one), last: unit.value, take: (value) => { unit.value = value; own.last = value; } };
+  unit.addEventListener("change", () => { triadFollows(own, own.last); own.last = unit.value; write(); });
   const element = h("tr", {}, h("td", {}, use), h("th", { scope: "row" }, String(channel.column ?? channel.name)), h("td", {}, as), h("td", {}, quantity), h("td", {}, unit), h("td", {}, scale), h("td", { class: "n" }, known && known.mean !== null && known.mean !== undefined ? number(Number(known.mean.toPrecision(4))) : ""), h("td", { class: "note" }, known ? known.source : ""));
-  return { element, value: () => !use.checked ? null : { ...channel, name: as.value.trim(), quantity: quantity.value, unit: unit.value, scale: Number(scale.value) } };
+  return { own, element, value: () => !use.checked ? null : { ...channel, name: as.value.trim(), quantity: quantity.value, unit: unit.value, scale: Number(scale.value) } };
 }
 
 /** The description as it stands in the form; what the form does not show stays as the service proposed it. */
@@ -43,15 +54,20 @@ function described() {
 function write() { byHand = false; at("description").value = JSON.stringify(described(), null, 2); settle(); }
 
 function settle() {  // the questions that a person answers by looking
-  const open = doubts.some((box) => !box.checked);
+  for (const { box, text, about, words } of doubts) {
+    const changed = about.filter((one) => one.unit() !== one.proposed), said = changed.length ? t("You chose the units: {units}", { units: about.map((one) => `${one.channel()} ${one.unit()}`).join(", ") }) : text;
+    if (words.textContent !== said) { words.textContent = said; box.checked = false; }  // what was ticked is no longer what it says
+  }
+  const open = doubts.some(({ box }) => !box.checked);
   wizard.querySelector("button.go").disabled = open;
 }
 
 function asked(text) {
-  const box = h("input", { type: "checkbox" });
+  const box = h("input", { type: "checkbox" }), words = h("span", {}, text);
+  const named = (one) => one.names.some((name) => text.split(/[\s(),:;]+/).includes(name));
   box.addEventListener("change", settle);
-  doubts.push(box);
-  return h("label", { class: "row warning" }, box, text);
+  doubts.push({ box, text, words, about: text.includes(" taken as ") ? rows.map((one) => one.own).filter(named) : [] });  // of units alone
+  return h("label", { class: "row warning" }, box, words);
 }
 
 function show(found, first) {

@@ -103,13 +103,22 @@ function live({ live: found }) {
   if (found.bench !== job.bench || !found.job || found.job.id !== job.job || !at("live")) return;
   if (found.job.station !== station) { station = found.job.station; seen = -Infinity; means.clear(); }
   at("progress").value = found.job.fraction;
-  at("live").textContent = t("{label}: {bench} of bench time left, about {wall} of real time before the analysis", { label: found.job.label, bench: span(found.job.eta_s), wall: span(found.job.eta_wall_s) });
+  const left = { label: found.job.label, bench: span(found.job.eta_s), wall: span(found.job.eta_wall_s) };
+  at("live").textContent = found.job.eta_wall_s === null ? t("{label}: {bench} of bench time left", left) : t("{label}: {bench} of bench time left, about {wall} of real time before the analysis", left);
   const planned = stations[station];
   if (found.devices) devices(found.devices, planned && planned.angles ? [planned.angles.outer_deg, planned.angles.middle_deg, planned.angles.inner_deg] : null);
   if (found.samples) samples(found.samples);
 }
 
+/** While somebody is asked, the job drives nothing: it waits for the answer. */
+function asked({ news }) {
+  const place = at("explanation");
+  if (!place || news.bench.id !== job.bench || !news.job || news.job.id !== job.job) return;
+  place.textContent = news.job.prompt ? t("It waits for a person: what is to be done stands at the top of the page.") : place.dataset.text;
+}
+
 if (job.open) {
+  feed.on("bench", asked);
   feed.on("job", (message) => { if (message.job === job.job) happened(message.events); });
   feed.on("live", live);
   feed.follow(job.job);

@@ -1,7 +1,7 @@
 // What every page does: says at once when the service is away, shows stops and prompts, local times, name and theme.
 import { wire } from "./act.js";
 import { send, part, me, iAm, Refused } from "./api.js";
-import { h, localTimes, moment, titled } from "./dom.js";
+import { clock, h, localTimes, moment, titled } from "./dom.js";
 import * as feed from "./feed.js";
 import { attitude } from "./table3d.js";
 import { t } from "./words.js";
@@ -20,7 +20,7 @@ function away() {
   if (gone && feed.state.why === "log-in") {
     box.append(h("strong", {}, t("Your log-in has ended; the stop works without one.")), " ", h("a", { href: `/log-in?next=${part(location.pathname)}` }, t("Log in")));
   } else if (gone) {
-    const since = new Date(feed.state.at).toLocaleTimeString();
+    const since = clock(new Date(feed.state.at));
     box.append(h("strong", {}, t("The service does not answer since {since}.", { since })), " ",
       t("What this page shows is old. A stop may not arrive: where there is danger, use the hardware emergency stop."));
   } else if (feed.state.why) {
@@ -54,7 +54,7 @@ function promptBox({ bench, job }) {
     prompt.angles_deg && h("canvas", { width: 150, height: 120, role: "img", "data-angles": prompt.angles_deg.join(" "),
       "aria-label": t("The table at {angles}", { angles: prompt.angles_deg.map((a) => `${a.toFixed(1)}°`).join(", ") }) }),
     h("div", {}, h("strong", {}, t("To be done at bench {bench}:", { bench: bench.id })), " ",
-      h("a", { href: job.page }, `${titled(job.procedure)} ${job.unit}`), ", ", t("station {n}", { n: job.progress.station }), ". ", t("Asked"), " ", moment(prompt.asked_at),
+      h("a", { href: job.page }, `${titled(job.procedure)} ${job.unit}`), ". ", t("{n} of {all} stations are done.", { n: job.progress.station, all: job.progress.stations }), " ", t("Asked"), " ", moment(prompt.asked_at),
       h("p", { class: "big" }, prompt.text),
       h("label", {}, t("Remark"), remark),
       h("div", { class: "verbs" }, h("button", { type: "button", class: "go", onclick: answer(true) }, t("Done")),
@@ -98,7 +98,7 @@ function show() {
 function status({ bench, job }) {
   const place = document.querySelector(`form.stop[data-bench="${CSS.escape(bench.id)}"] .status`);
   if (!place) return;
-  const text = bench.state === "stopped" ? t("stopped") : job ? `${t("busy")}: ${titled(job.procedure)} #${job.number}` : bench.driven_by ? t("idle") : t("no worker");
+  const text = bench.state === "stopped" ? t("stopped") : job ? `${job.prompt && !answered.has(job.prompt.id) ? t("waits for a person") : t("busy")}: ${titled(job.procedure)} #${job.number}` : bench.driven_by ? t("idle") : t("no worker");
   if (place.textContent !== text) place.textContent = text;
   place.className = `status ${bench.state}`;
 }

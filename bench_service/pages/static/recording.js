@@ -1,7 +1,7 @@
 // The samples of a recording over any stretch: the service makes least, mean and greatest of each bin.
 import { part, read } from "./api.js";
 import { busy } from "./act.js";
-import { COLOURS } from "./charts.js";
+import { COLOURS, ticks } from "./charts.js";
 import { h, number, shownIn } from "./dom.js";
 import { t } from "./words.js";
 
@@ -21,7 +21,7 @@ function draw(key, members, mids) {
   if (known) { known.setData(data); return; }
   const title = key.split(" ")[0], box = h("section", { class: "chart", "aria-label": title }, h("h3", {}, `${title}, ${unit}`));
   document.getElementById("charts").append(box);
-  const axis = (label) => ({ label, stroke: css("--ink"), grid: { stroke: css("--line"), width: 1 }, size: 66 });
+  const axis = (label) => ({ label, values: ticks, stroke: css("--ink"), grid: { stroke: css("--line"), width: 1 }, size: 66 });
   const value = (_, v) => number(v === null ? null : Number(v.toPrecision(6)));
   const plot = new uPlot({ width: Math.max(240, box.clientWidth - 8), height: 260, scales: { x: { time: false } }, axes: [axis(t("time, s")), axis("")],
     series: [{ label: "t" }, ...members.flatMap((one, k) => { const stroke = COLOURS[k % COLOURS.length]; return [

@@ -3,6 +3,7 @@ import { part, read, send } from "./api.js";
 import { busy } from "./act.js";
 import { fill, h, span } from "./dom.js";
 import { SchemaForm } from "./form.js";
+import { onceAt } from "./once.js";
 import { showPreview } from "./preview.js";
 import { t } from "./words.js";
 
@@ -92,8 +93,10 @@ async function go() {
 async function calibrateThenVerify() {  // a campaign of the service: nothing is stored before the run is accepted
   const parameters = form.values(), { seed, labels } = extras();
   const body = { unit: unit(), ...(bench() && { bench: bench() }), ...(Object.keys(parameters).length && { parameters: { calibrate: parameters } }), seed, labels };
-  const run = await busy(at("go-both"), at("refusal"), () => send(`/api/v1/campaigns/${BOTH}/runs`, body, { key }));
-  if (run) location.href = `/campaign-runs/${run.id}`;
+  const later = new FormData(at("terms")).get("not_before");
+  if (later && (body.parameters || seed !== undefined)) { at("refusal").textContent = t("A start at a time takes the default parameters and draws its seed: keep this plan as a campaign, then schedule that."); return; }
+  const run = await busy(at("go-both"), at("refusal"), () => later ? send("/api/v1/schedules", { campaign: BOTH, unit: body.unit, bench: body.bench, labels, ...onceAt(later) }, { key }) : send(`/api/v1/campaigns/${BOTH}/runs`, body, { key }));
+  if (run) location.href = later ? "/campaigns#schedules" : `/campaign-runs/${run.id}`;
 }
 
 async function keep() {

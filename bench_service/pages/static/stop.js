@@ -3,7 +3,7 @@
 (() => {
   const LATE_MS = 1500, GIVE_UP_MS = 30000, LOOK_MS = 200, SAFE_MS = 2000, WATCH_MS = 60000;
   const name = () => { try { return localStorage.getItem("bench.name") || ""; } catch { return ""; } };
-  const clock = () => new Date().toLocaleTimeString();
+  const clock = () => new Date().toLocaleTimeString("sv-SE", { hour: "2-digit", minute: "2-digit", second: "2-digit", timeZoneName: "short" });
 
   function show(form, kind, ...texts) {
     const output = form.querySelector("output");

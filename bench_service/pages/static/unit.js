@@ -27,6 +27,7 @@ if (form) {
       return differences(first, second);
     });
     if (!rows) return;
+    output.textContent = t("Shown: the first less the second.");
     fill(document.getElementById("difference"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Differences") }, h("table", {},
       h("thead", {}, h("tr", {}, ...["Coefficient", "Difference", "± standard uncertainty", "Unit", "Difference over σ"].map((name) => h("th", {}, t(name))))),
       h("tbody", {}, ...rows.map((row) => h("tr", {}, h("th", { scope: "row" }, row.name), h("td", { class: "n" }, number(row.delta, row.sigma)), h("td", { class: "n" }, number(Number(row.sigma.toPrecision(2)))), h("td", {}, row.unit),

@@ -9,7 +9,7 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
-from bench_service.bench.processes import Driving, ProcessIdentity
+from bench_service.bench.processes import Driving, ProcessIdentity, living
 from bench_service.model.errors import BenchBusy
 
 
@@ -32,8 +32,19 @@ class HostFiles:
             return None
 
     def begin_driving(self) -> None:
-        """Write into the file that this process drives the bench. Its lease must be held."""
+        """Write into the file that this process drives the bench. Its lease must be held.
+
+        Raises `BenchBusy` where another living process does: by another database, or one that lost its lease and has
+        not noticed. The supervisor watches one process, and would not see the end of the other.
+        """
         self._driver.parent.mkdir(parents=True, exist_ok=True)
+        other = living(self.driving())
+        if other is not None and other != ProcessIdentity.own():
+            raise BenchBusy(
+                f"bench {self._bench_id!r} is driven from the folder {self._driver.parent.absolute()} by {other}, "
+                "though this database has no process that drives it: end that one, or give this one another "
+                "BENCH_DEVICE_FOLDER or BENCH_ID"
+            )
         self._write(False)
 
     def end_driving(self) -> None:

@@ -94,11 +94,16 @@ def add_corrections(
 ) -> None:
     """Add a result's corrections to the unit's history; by the rule they become current where the result passed.
 
-    `by_rule`: False for a second analysis or a method, whose corrections become current only when a person chooses
-    them. Of two that become current at once, the index lets one wait and the store try again.
+    A person's usable choice stands. `by_rule`: False for a second analysis or a method, whose corrections become
+    current only when a person chooses them. Of two that become current at once, the index lets one wait and the store
+    try again.
     """
-    make_current = by_rule and result.verdict is Verdict.PASS
+    if not corrections:
+        return
+    known = corrections_where(session, CorrectionRow.unit == result.unit, CorrectionRow.is_current)
+    standing = {c.correction.kind for c in known if not c.gives_way(wall_clock.now())}
     for correction in corrections:
+        make_current = by_rule and result.verdict is Verdict.PASS and correction.kind not in standing
         if make_current:
             retire_current(session, result.unit, correction.kind)
         session.add(

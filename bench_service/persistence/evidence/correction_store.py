@@ -73,6 +73,17 @@ class SqlCorrectionStore:
 
         return self._decided(unit, correction_id, by, Act.CHOSEN, "correction choice", idempotency, choose)
 
+    def choose_by_rule(self, unit: str, kind: CorrectionKind, by: Decider) -> StoredCorrection:
+        with self._database.read() as session:
+            found = _by_rule(session, unit, kind)
+
+        def choose(session: Session, row: CorrectionRow) -> None:
+            _lock_all(session, unit, row.kind)
+            retire_current(session, unit, row.kind)
+            _set(session, row, is_current=True)
+
+        return self._decided(unit, found, by, Act.GIVEN_BACK, "correction choice", None, choose)
+
     def approve(
         self,
         unit: str,
@@ -126,6 +137,18 @@ def _set(session: Session, row: CorrectionRow, **values: object) -> None:
     """Write values as they are given now, also where the row was read with the same ones."""
     session.execute(update(CorrectionRow).where(CorrectionRow.id == row.id).values(**values))
     session.expire_all()
+
+
+def _by_rule(session: Session, unit: str, kind: str) -> str:
+    """Id of the newest correction that the rule would make current. Raises `CorrectionRefused` without one."""
+    at = wall_clock.now()
+    for found in reversed(corrections_where(session, CorrectionRow.unit == unit, CorrectionRow.kind == kind)):
+        if found.of_job and found.verdict is Verdict.PASS and not found.unusable(at):
+            return found.id
+    raise CorrectionRefused(
+        f"no job that passed has given unit {unit} a usable correction of the kind {kind!r}: run one, or choose one of "
+        "its history"
+    )
 
 
 def _require_remark(session: Session, row: CorrectionRow, by: Decider) -> None:

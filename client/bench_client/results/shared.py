@@ -23,8 +23,8 @@ class Decision(Part):
 
     rule: str
     """Rule in words; a test of significance is held at its level, without a guard band."""
-    outcome: Literal["pass", "conditional pass", "conditional fail", "fail"]
-    """Outcome: pass, fail, conditional pass or conditional fail"""
+    outcome: Literal["pass", "conditional pass", "conditional fail", "fail", "inconclusive"]
+    """Outcome: pass, fail, conditional pass, conditional fail or inconclusive"""
     expanded_uncertainty: float | None = None
     """Expanded uncertainty U in the limit's unit; None: the value has no stated uncertainty."""
     coverage_factor: float | None = None
@@ -58,6 +58,8 @@ class Check(Part):
     """Rule by which it was decided, and the expanded uncertainty; None in results of versions before it."""
     significance: bool = False
     """True for a test of significance: the value is a p-value and the limit its level."""
+    bound: bool = False
+    """True: nothing was observed, and the value is what it stays below."""
 
 
 Verdict = Literal["pass", "fail", "error"]
@@ -66,7 +68,7 @@ Verdict = Literal["pass", "fail", "error"]
 class Statement(Part):
     """Statement of conformity of a whole result."""
 
-    outcome: Literal["pass", "conditional pass", "conditional fail", "fail"]
+    outcome: Literal["pass", "conditional pass", "conditional fail", "fail", "inconclusive"]
     """The verdict, conditional where some value lies within its expanded uncertainty of the limit."""
     rule: str
     """Decision rule in words."""
@@ -264,9 +266,7 @@ class TriadSummary(Part):
     left_out: Magnitudes | None = None
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
     suspect: str = ""
-    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared.
-    `triad_analysis.suspected` finds it from all triads of the same stations.
-    """
+    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
     budgets: tuple[Budget, ...] = ()
     """Uncertainty budget of each coefficient; empty in results of older versions."""
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import block_diag, null_space
 
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
-from procedures.analysis.calibration.magnitude import magnitude_gradient
+from procedures.analysis.calibration.magnitude import in_sample_gain, magnitude_gradient
 from procedures.analysis.calibration.noise_scale import noise_factor
 from procedures.analysis.calibration.suspect_flaw import FreeResiduals, free_residuals
 from procedures.analysis.calibration.table_errors import TableErrors
@@ -153,7 +153,7 @@ def _expected(
     flaws = of_table.transpose(1, 0, 2).reshape(3 * n, -1)
     remaining = plan.remaining()
     gradient = magnitude_gradient(vectors, np.linalg.inv(matrix))
-    along = np.einsum("nc,cnj->nj", gradient, remaining.reshape(3, n, 3 * n))
+    along = in_sample_gain(gradient, remaining)
 
     def sd(rows: Array) -> Array:
         noise = np.einsum("kci,cij,kcj->k", rows.reshape(-1, 3, n), noise_covariance, rows.reshape(-1, 3, n))

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
+from procedures.analysis.calibration.magnitude import in_sample_gain, magnitude_gradient
 from procedures.analysis.calibration.reference import reference_vectors
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import windows
@@ -163,6 +165,21 @@ def parts_by_noise(plan: TriadPlan, noise_covariance: Array) -> tuple[Array, Arr
 
 def _parts(plan: TriadPlan, gls: Estimator) -> tuple[Array, Array]:
     return np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
+
+
+def in_sample_covariance(plan: TriadPlan) -> Array | None:
+    """Covariance (n, n) of |v̂| − |v| at the stations of a planned calibration itself; None for unknown noise.
+
+    Noise and the table's flaws, less what the calibration takes from them. Raises `Undetermined`.
+    """
+    planned = plan.at_dwell()
+    if planned is None:
+        return None
+    n = len(plan.vectors)
+    gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
+    along = in_sample_gain(gradient, planned.estimator.remaining())
+    flaws = along @ plan.table.of_outputs(plan.matrix).transpose(1, 0, 2).reshape(3 * n, -1)
+    return along @ block_diag(*planned.noise_covariance) @ along.T + flaws @ flaws.T
 
 
 def basis(plans: Sequence[TriadPlan]) -> str:

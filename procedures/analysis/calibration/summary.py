@@ -82,11 +82,8 @@ class TriadSummary:
     """Station and channel with the greatest residual."""
     left_out: Magnitudes | None = None
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
-    suspect: str = ""
-    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared.
-
-    `triad_analysis.suspected` finds it from all triads of the same stations.
-    """
+    suspect: str = ""  # by `triad_analysis.suspected`, from all triads of the same stations
+    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
     budgets: tuple[Budget, ...] = ()
     """Uncertainty budget of each coefficient; empty in results of older versions."""
 

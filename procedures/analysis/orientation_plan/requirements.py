@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
+from scipy.special import chdtrc, chdtri
 
 from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
-from procedures.analysis.calibration.plan import TriadPlan
+from procedures.analysis.calibration.plan import TriadPlan, in_sample_covariance
 from procedures.analysis.calibration.reference import INPUT_UNITS
 from procedures.analysis.calibration.station_plan import dwell_for
 from procedures.analysis.calibration.verification import effective_freedom, predicted_sd
@@ -19,6 +19,8 @@ BIASES = (0, 4, 8)
 SCALE_FACTORS = (1, 6, 11)
 IN_RUN_SOURCE = "thesis 4.3, 5.1"
 IN_RUN_LEVEL = 0.001
+RARE = 0.01
+"""Chance that a sound unit fails a check, below which a plan does not mention it."""
 
 _TURNS = (
     "whole turns of the table at a known rate determine it instead (procedure scale_factor_whole_turns: ±n·360°, the "
@@ -92,15 +94,18 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     )
 
 
-def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size: float) -> str | None:
+def in_run_unresolved(
+    plan: TriadPlan, limit: float, display: str, display_size: float, *, in_sample: bool = False
+) -> str | None:
     """Return a warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit
     [SI]; else None.
+
+    `in_sample`: of a calibration at its own stations, which follows a part of the noise.
     """
-    planned = plan.at_dwell()
-    if planned is None:
+    covariance = in_sample_covariance(plan) if in_sample else _of_dwells(plan)
+    if covariance is None:
         return None
-    gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
-    expected = predicted_sd(magnitude_covariance(gradient, planned.noise_covariance)) / float(np.sqrt(3.0))
+    expected = predicted_sd(covariance) / float(np.sqrt(3.0))
     if expected <= limit:
         return None
     return (
@@ -109,23 +114,26 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
     )
 
 
+def _of_dwells(plan: TriadPlan) -> Array | None:
+    """Covariance (n, n) of magnitudes by the noise of the dwells alone; None where it is not known."""
+    noise = plan.noise_covariance()
+    gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
+    return None if noise is None else magnitude_covariance(gradient, noise)
+
+
 def in_run_check(
-    plan: TriadPlan, maximum: float | None, covariance: Array | None = None, level: float = IN_RUN_LEVEL
+    plan: TriadPlan, maximum: float | None, covariance: Array | None, level: float = IN_RUN_LEVEL
 ) -> PlannedCheck:
     """Planned check of the error per axis δ/√3 of n stations, its limit in the triad's unit of display.
 
-    δ² is a mean square of the degrees of freedom of `effective_freedom`; its part of the measurement is what the noise
-    of the dwells leaves, or errors of magnitude with the `covariance` (n, n) given. Without a maximum the limit is the
-    plan's expanded uncertainty: what a sound unit exceeds with the probability `level`, ``k² = χ²_ν(1 − level)/ν``.
+    δ² is a mean square of the degrees of freedom of `effective_freedom`; its part of the measurement has errors of
+    magnitude with the `covariance` (n, n), None where the noise is not known. Without a maximum the limit is the plan's
+    expanded uncertainty: what a sound unit exceeds with the probability `level`, ``k² = χ²_ν(1 − level)/ν``.
     (k = 2 would not do: where six coefficients that change between launches move all stations, ν is near 2 and one
     sound unit in fifty exceeds it.) Raises `BadParameter` where the uncertainty is not known.
     """
     display, size = units.DISPLAY[INPUT_UNITS[plan.triad]]
     name = f"{plan.triad} bias in run, δ/√3"
-    planned = plan.at_dwell()
-    if covariance is None and planned is not None:
-        gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
-        covariance = magnitude_covariance(gradient, planned.noise_covariance)
     floor = None if covariance is None else predicted_sd(covariance) / float(np.sqrt(3.0)) / size
     freedom = None if covariance is None else effective_freedom(covariance)
     own = None
@@ -139,6 +147,31 @@ def in_run_check(
         field = f"limits.{plan.triad}_bias_in_run_{'deg_h' if plan.triad == 'gyro' else 'm_s2'}"
         raise BadParameter(field, None, "a number: the noise is not known, so the plan has no uncertainty to take")
     return PlannedCheck(name, limit, floor, freedom, 0.0, own)
+
+
+def sound_unit_fails(planned: PlannedCheck) -> float | None:
+    """Chance that a sound unit exceeds the limit of a root mean square; None where the plan does not predict it.
+
+    ``P(χ²_ν > ν·limit²/u²)`` with the u that the plan predicts and its effective degrees of freedom ν: an approximation
+    by two moments, good to about a percentage point (Satterthwaite). A sound unit's true value is zero.
+    """
+    u, freedom, limit = planned.standard_uncertainty, planned.degrees_of_freedom, planned.limit.maximum
+    if u is None or freedom is None or limit is None:
+        return None
+    return float(chdtrc(freedom, freedom * (limit / u) ** 2)) if u > 0.0 else 0.0
+
+
+def chance_of_failure(planned: PlannedCheck) -> str | None:
+    """Warning where a sound unit fails a planned check oftener than `RARE`, with the chance and what makes it."""
+    chance = sound_unit_fails(planned)
+    if chance is None or chance < RARE:
+        return None
+    limit = planned.limit
+    return (
+        f"{planned.check}: a sound unit exceeds the limit of {limit.maximum:g} {limit.unit} with a chance of about "
+        f"{100.0 * chance:.2g} %, for noise, the calibration's uncertainty and the unit's change between launches make "
+        f"about {planned.standard_uncertainty:.2g} {limit.unit}: such a FAIL alone is no fault of the unit"
+    )
 
 
 def _length(dwell_s: float) -> str:

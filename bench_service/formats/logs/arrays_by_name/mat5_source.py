@@ -7,6 +7,8 @@ _PIECE = 256 * 1024
 WHOLE_BYTES = 16 * 1024 * 1024
 """Size of a variable that is unpacked at once."""
 MOST_MARKS = 16
+_GLANCE = 4096
+"""Number of bytes that are unpacked at once where only the head of a variable is asked for."""
 
 
 class Walk(Protocol):
@@ -122,7 +124,7 @@ class _PackedWalk:
         other._unpacker, other._have, other.at = self._unpacker.copy(), self._have, self.at
         return other
 
-    def _fill(self, size: int) -> None:
+    def _fill(self, size: int, at_once: int = 4 * _PIECE) -> None:
         parts, have = [self._have], len(self._have)
         while have < size:
             data = self._unpacker.unconsumed_tail
@@ -130,7 +132,7 @@ class _PackedWalk:
                 self._stream.seek(self._next)
                 data = self._stream.read(min(_PIECE, self._end - self._next))
                 self._next += len(data)
-            part = self._unpacker.decompress(data, 4 * _PIECE)
+            part = self._unpacker.decompress(data, at_once)
             if not part and (self._unpacker.eof or not data):
                 break
             parts.append(part)
@@ -146,7 +148,7 @@ class _PackedWalk:
     def glance(self, at: int, size: int) -> bytes:
         """Return bytes at a place without taking those after it. Raises `EOFError`."""
         self.skip_to(at)
-        self._fill(size)
+        self._fill(size, _GLANCE)
         if len(self._have) < size:
             raise EOFError("it ends too early")
         return self._have[:size]

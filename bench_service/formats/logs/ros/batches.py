@@ -19,13 +19,13 @@ class Batches:
         self._clear()
 
     def _clear(self) -> None:
-        self._messages: list[bytes | memoryview] = []
+        self._messages: list[bytes] = []
         self._times: list[int] = []
         self._bytes = 0
 
     def add(self, data: bytes | memoryview, received_ns: int, published_ns: int = 0) -> Iterator[list[Numbers]]:
         """Add a message; yield blocks of columns once there are enough messages to decode."""
-        self._messages.append(data)
+        self._messages.append(bytes(data))  # a view would keep its whole chunk, with the images that are in it
         self._times.append(received_ns)
         self._times.append(published_ns)
         self._bytes += len(data)

@@ -14,6 +14,7 @@ from bench_service.formats.logs.ros.batches import Batches
 from bench_service.formats.logs.ros.definitions import distribution, full_name, parsed
 from bench_service.formats.logs.ros.messages import Decoder, Topic
 from bench_service.formats.logs.ros.sqlite_stream import connected
+from bench_service.formats.logs.ros.unpacked import ZSTD, unpacked_stream
 from bench_service.formats.logs.table import LogTable, Numbers
 
 NAME = "rosbag2"
@@ -72,10 +73,14 @@ class Database:
         if found.type_name not in found.types:
             found.problem = f"the bag has no definition of {quoted(title)}, and it is none of the common types"
         first = next(self._ask("SELECT data FROM messages WHERE topic_id = ? LIMIT 1", [number]), None)
-        found.first = None if first is None else bytes(first[0])
+        found.first = None if first is None else self._plain(first[0])
         count = next(self._ask("SELECT count(*) FROM messages WHERE topic_id = ?", [number]))
         found.rows = int(count[0])
         return found
+
+    def _plain(self, data: bytes) -> bytes:
+        """Return a message, unpacked where the bag was recorded with compression_mode message."""
+        return unpacked_stream(data, self._name) if data[:4] == ZSTD else bytes(data)
 
     def tables(self) -> list[LogTable]:
         """Return the topics that have messages as tables."""
@@ -91,5 +96,5 @@ class Database:
         batches = Batches(Decoder(self._topics[number], columns, self._name))
         query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY id"
         for received, data in self._ask(query, [number]):
-            yield from batches.add(data, received)
+            yield from batches.add(self._plain(data), received)
         yield from batches.rest()

@@ -5,7 +5,24 @@ from typing import Any
 
 import pyarrow as pa
 
+from bench_service.formats.bounds import MEGABYTE
 from bench_service.formats.errors import UnreadableFile
+
+ZSTD = b"\x28\xb5\x2f\xfd"
+"""First bytes of a frame of zstd; no CDR begins so."""
+LARGEST_MESSAGE = 16 * MEGABYTE
+
+
+def unpacked_stream(data: bytes, name: str) -> bytes:
+    """Unpack a message whose size is not known, by zstd. Raises `UnreadableFile`."""
+    try:
+        with pa.CompressedInputStream(pa.BufferReader(data), "zstd") as stream:
+            found = stream.read(LARGEST_MESSAGE + 1)
+    except (pa.ArrowException, OSError) as error:
+        raise UnreadableFile(name, f"a message cannot be unpacked (zstd: {str(error)[:100]})") from error
+    if len(found) > LARGEST_MESSAGE:
+        raise UnreadableFile(name, f"a message unpacks to more than {LARGEST_MESSAGE // MEGABYTE} MB")
+    return found
 
 
 def unpacked(data: Any, compression: str, size: int, name: str) -> Any:

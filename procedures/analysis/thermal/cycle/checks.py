@@ -86,4 +86,4 @@ def _noise(name: str, noises: list[GyroNoise], process: int, maximum: float) -> 
     if seen:
         return check(name, float(np.mean(seen)) / size, limit, note=f"seen in {len(seen)} of {len(values)} runs")
     bound = min(g.upper_limits[process] for g in noises)
-    return check(name, bound / size, limit, note="not observed: the value is what it stays below")
+    return check(name, bound / size, limit, note="not observed: the value is what it stays below", bound=True)

@@ -1,0 +1,36 @@
+"""Records of a stop channel as stop requests; one of another version that is none is as unreadable as a torn one."""
+
+from typing import Any
+
+from bench_service.bench.records_in_place import RECORD_BYTES, Unreadable, decoded, read_record
+from bench_service.bench.stop.word import DAMAGED, StopWord
+
+
+def words_in(page: bytes, leave_out_damaged: bool = False) -> tuple[StopWord, ...]:
+    """The stop requests in a page of records. Raises `Unreadable`, unless what is damaged is left out."""
+    found: list[StopWord] = []
+    for at in range(0, len(page), RECORD_BYTES):
+        try:
+            document = decoded(page[at : at + RECORD_BYTES])
+            if document is not None:
+                found.append(_word(document))
+        except Unreadable:
+            if not leave_out_damaged:
+                raise
+    return tuple(found)
+
+
+def document_in(file: int, number: int) -> dict[str, Any] | None:
+    """The document of the stop request in a record; one that is unreadable counts as damaged. Raises `OSError`."""
+    try:
+        found = read_record(file, number)
+        return found if found is None else _word(found).document()
+    except Unreadable:
+        return {"id": DAMAGED.id}
+
+
+def _word(document: dict[str, Any]) -> StopWord:
+    try:
+        return StopWord.of(document)
+    except (TypeError, ValueError, KeyError, AttributeError):
+        raise Unreadable from None
