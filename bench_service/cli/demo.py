@@ -7,7 +7,8 @@ from rich.text import Text
 
 from bench_service.cli.asking.client import RESULT, call
 from bench_service.cli.asking.watching import JOB, exit_code, watch
-from bench_service.cli.printing.tables import check_table, coefficient_table
+from bench_service.cli.printing.check_tables import check_table
+from bench_service.cli.printing.tables import coefficient_table
 
 if TYPE_CHECKING:
     import httpx

@@ -108,6 +108,7 @@ class SimulatedDriver:
         """
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
+        self.warm_up()  # a job that came before the service's own warm-up would do it during its first demand
         config = replace(
             self._config(unit, 0 if seed is None else seed),
             sample_rate_hz=needs.sample_rate_hz,
@@ -139,6 +140,7 @@ class SimulatedDriver:
         """
         from simulators.world import WorldConfig, build
 
+        self.warm_up()
         known = unit == self._unit.serial or _drawn_truth(unit) is not None
         return build(
             WorldConfig(

@@ -36,7 +36,6 @@ MODULES = (
     "procedures.launches",
     "procedures.analysis.thermal.cycle.series",
     "scipy.fft",
-    "scipy.signal",
     "bench_service.persistence.evidence.recording_store",
 )
 """Modules that a process imports beforehand: it has the time while a job records."""

@@ -9,15 +9,12 @@ Arrow is imported where a chunk is encoded or decoded: a service that starts doe
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from procedures.core.recording import RawArray
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 RAW_BYTES = 2 * 1024 * 1024
 """Raw size of a full chunk: the payload stays under a megabyte for noise up to 10 bits, and decodes in milliseconds."""
@@ -95,7 +92,7 @@ def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
     return out
 
 
-def arrow_array(values: NDArray[Any]) -> "pa.Array[Any]":
+def arrow_array(values: NDArray[Any]) -> Any:
     """Numbers as an Arrow array over the same memory, without missing values.
 
     `pyarrow.array` imports pandas wherever that is installed: half a second and 50 MB, for values of other kinds.

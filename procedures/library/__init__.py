@@ -9,6 +9,7 @@
 ``scalar(outputs, magnitude, sd)``      nine parameters of a triad from the magnitude alone
 ``thermal(temperature_c, values, ...)`` polynomial of a zero or a scale in temperature
 ``load(file)``                          columns of a CSV, .npy or .npz file
+``load_calibration(file)``              a calibration that the service exported as JSON, to correct samples
 ======================================  ==================================================================
 
 Samples are lists, numpy arrays or pandas series; every number comes with its standard uncertainty; every refusal is a
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from procedures.core.errors import BadParameter, DomainError, Undetermined, UnfitRecording
     from procedures.library.columns import Columns, load
     from procedures.library.deviations import Curve, allan, allan_family
+    from procedures.library.exported import ExportedCalibration, load_calibration
     from procedures.library.record_noise import Noise, noise
     from procedures.library.temperature import Polynomial, thermal
     from procedures.library.triads import Calibration, calibrate, scalar
@@ -35,6 +37,7 @@ __version__ = "0.1.0"
 _ROOMS = {
     "core.errors": ("BadParameter", "DomainError", "Undetermined", "UnfitRecording"),
     "library.deviations": ("Curve", "allan", "allan_family"),
+    "library.exported": ("ExportedCalibration", "load_calibration"),
     "library.triads": ("Calibration", "calibrate", "scalar"),
     "library.columns": ("Columns", "load"),
     "library.record_noise": ("Noise", "noise"),
@@ -49,6 +52,7 @@ __all__ = [
     "Columns",
     "Curve",
     "DomainError",
+    "ExportedCalibration",
     "Noise",
     "Polynomial",
     "Split",
@@ -58,6 +62,7 @@ __all__ = [
     "allan_family",
     "calibrate",
     "load",
+    "load_calibration",
     "noise",
     "scalar",
     "split",

@@ -14,7 +14,14 @@ from procedures.core.unit import Unit
 from procedures.procedure import Evidence, JudgedParameters, Method, Outcome, Planned
 
 TRIADS = ("gyro", "accelerometer")
-SOURCE = "thesis 4.3, 5.6"
+SOURCE, ASKED = "thesis 4.3, 5.6", "the request"
+FIELDS = {
+    ("gyro", True): "gyro_bias_run_to_run_deg_h",
+    ("gyro", False): "gyro_scale_run_to_run_ppm",
+    ("accelerometer", True): "accelerometer_bias_run_to_run_m_s2",
+    ("accelerometer", False): "accelerometer_scale_run_to_run_ppm",
+}
+"""Triad, and whether it is the bias -> the field of the limit."""
 
 
 class Params(JudgedParameters):
@@ -101,13 +108,17 @@ def _show(s: Scatter, value: float) -> str:
 def _limit(s: Scatter, params: Params) -> Limit | None:
     """Limit in a display unit; None for a bias in counts, and where none was given."""
     maximum = None if s.unit == "count" else _maximum(s.triad, s.name.startswith("bias"), params)
-    return None if maximum is None else Limit(_display(s)[0], maximum=maximum, source=SOURCE)
+    return None if maximum is None else _limit_of(s.triad, s.name.startswith("bias"), maximum, _display(s)[0])
 
 
 def _maximum(triad: str, bias: bool, params: Params) -> float | None:
-    if triad == "gyro":
-        return params.gyro_bias_run_to_run_deg_h if bias else params.gyro_scale_run_to_run_ppm
-    return params.accelerometer_bias_run_to_run_m_s2 if bias else params.accelerometer_scale_run_to_run_ppm
+    return getattr(params, FIELDS[triad, bias])
+
+
+def _limit_of(triad: str, bias: bool, maximum: float, unit: str) -> Limit:
+    """The limit with its source: another value than the thesis's comes from the request."""
+    default = Params.model_fields[FIELDS[triad, bias]].default
+    return Limit(unit, maximum=maximum, source=SOURCE if maximum == default else ASKED)
 
 
 def _si(s: Scatter, limit: Limit) -> float:
@@ -139,7 +150,7 @@ def planned_checks(params: Params, unit: Unit, planned: Planned) -> tuple[Planne
             display, size = units.DISPLAY[own[0].unit] if bias else ("ppm", units.PPM)
             record, u = unit.triad(triad), sqrt(sum(p.standard_uncertainty**2 for p in own) / len(own)) / size
             sd = None if record is None else record.bias_run_to_run_sd if bias else record.scale_factor_run_to_run_sd
-            limit = Limit(display, maximum=maximum, source=SOURCE)
+            limit = _limit_of(triad, bias, maximum, display)
             expected = None if sd is None else sd / size
             found.append(PlannedCheck(f"{triad} {name} run to run", limit, u, len(own) - 1.0, expected))
     return tuple(found)

@@ -11,7 +11,7 @@ from simulators.served.acutrol import AcutrolLanguage
 from simulators.served.at_once import at_once
 from simulators.served.chamber import TYPE, ChamberTalker, Controller
 from simulators.served.faults import Fault, FaultPlan
-from simulators.served.pace import Pace, PacedClock
+from simulators.served.pace import MADE_UP_S, Pace, PacedClock
 from simulators.served.person import PersonPort
 from simulators.served.ports import LinePort, Lines
 from simulators.served.scpi import ScpiLanguage
@@ -56,6 +56,8 @@ class ServedConfig:
     factor: float = 1.0
     """Bench seconds in a real second."""
     faults: Sequence[Fault] = ()
+    made_up_s: float = MADE_UP_S
+    """Longest pause of the process that is made up for [s, real time]."""
     valid_after_s: float = 0.5
     """Time from switching the unit on to its first valid data [s of the bench]."""
 
@@ -84,7 +86,7 @@ class ServedBench:
         self.config, self._wait = config, wait
         self.clock = PacedClock(config.world.rate_hz)
         self.bench: SimulatedBench = build(config.world, clock=self.clock, table=ControlledTable)
-        self.pace = Pace(self.clock, config.factor, now_s, wait)
+        self.pace = Pace(self.clock, config.factor, now_s, wait, config.made_up_s)
         self.plan = FaultPlan(tuple(config.faults))
         self.ports: dict[str, Port] = {}
         self.frames: CountFrames | IxcomFrames | None = None

@@ -11,7 +11,8 @@ LONGEST_S = 0.05
 """Longest real time that one step makes up for [s]."""
 MADE_UP_S = 1.0
 """Longest real time by which the world may be late and is still led to the present, step by step [s]: a busy machine
-holds a process up for some tenths of a second, and a unit keeps its rate meanwhile. What is more is given up."""
+holds a process up for some tenths of a second, and a unit keeps its rate meanwhile. What is more is given up. A test
+that must meet a motion under way at a high factor has less: there a pause that is made up for is a jump."""
 
 
 class PacedClock(SimClock):
@@ -37,11 +38,14 @@ class PacedClock(SimClock):
 class Pace:
     """Moves a clock by real time. What a slow machine cannot make up for is given up and counted."""
 
-    def __init__(self, clock: PacedClock, factor: float, now_s: Callable[[], float], wait: Wait) -> None:
+    def __init__(
+        self, clock: PacedClock, factor: float, now_s: Callable[[], float], wait: Wait, made_up_s: float = MADE_UP_S
+    ) -> None:
         """Set up; `factor`: bench seconds in a real one; `now_s`: real time; `wait`: waits real seconds."""
         if not 0.0 < factor <= 10_000.0:
             raise ValueError(f"time_factor = {factor!r} must be above 0 and at most 10000")
         self._clock, self._factor, self._now_s, self._wait = clock, factor, now_s, wait
+        self._made_up_s = made_up_s
         self.behind_s = 0.0
         """Bench time that was given up because the machine was too slow [s]."""
 
@@ -49,7 +53,7 @@ class Pace:
         """Move the clock until cancelled."""
         begin, done = self._now_s(), 0
         rate = self._clock.rate_hz * self._factor
-        most, made_up = max(1, int(LONGEST_S * rate)), max(1, int(MADE_UP_S * rate))
+        most, made_up = max(1, int(LONGEST_S * rate)), max(1, int(self._made_up_s * rate))
         while True:
             await self._wait(STEP_S)
             due = int((self._now_s() - begin) * rate) - done

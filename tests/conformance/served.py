@@ -15,6 +15,7 @@ from bench_service.drivers.wall_bench_clock import WallBenchClock
 from procedures.core.unit import Unit
 from simulators.served.bench import ServedBench, ServedConfig, ServedDevice
 from simulators.served.faults import Fault
+from simulators.served.pace import LONGEST_S
 from simulators.truth import declared_unit, default_unit
 from simulators.world import WorldConfig
 
@@ -91,7 +92,11 @@ class Served:
 
 @contextmanager
 def served(languages: dict[str, str], thermal: bool = False, factor: float = FACTOR, **more: Any) -> Iterator[Served]:
-    """A served bench with devices by language; `more` goes into its configuration."""
+    """A served bench with devices by language; `more` goes into its configuration.
+
+    A pause of the machine makes the world late by default: made up for, it would be a jump at this factor.
+    """
+    more.setdefault("made_up_s", LONGEST_S)
     datagrams = more.pop("datagrams", 0)
     devices = {name: ServedDevice(language) for name, language in languages.items()}
     if datagrams:
@@ -110,7 +115,7 @@ def opened(
     address = section.pop("address", f"tcp://127.0.0.1:{port}")
     powered = section.pop("powered", lambda: True)
     parsed = made.section.model_validate({"driver": name, "address": address, "answer_s": 0.5, **section})
-    context = DriverContext("wire", clock, folder, unit or declared_unit(default_unit()), powered)
+    context = DriverContext("wire", clock, folder, unit or declared_unit(default_unit()), powered, time_factor=factor)
     device = made.open(parsed, context)
     device.clock = clock
     return device

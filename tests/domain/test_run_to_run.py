@@ -60,6 +60,14 @@ def test_the_gyro_scale_misses_its_limit_and_nothing_else_does():
     assert METHOD.report(result).sections
 
 
+def test_only_the_thesiss_own_limits_have_it_for_their_source():
+    params = METHOD.params(gyro_scale_run_to_run_ppm=5000.0)
+    result = METHOD.analyse(Evidence(calibrations=thesis()), params, None)
+    sources = {c.name: c.limit.source for c in result.checks}
+    assert sources["gyro scale factor x run to run"] == "the request"
+    assert sources["gyro bias x run to run"] == sources["accelerometer scale factor z run to run"] == "thesis 4.3, 5.6"
+
+
 def test_a_limit_beneath_the_measurement_is_said_to_be_out_of_reach():
     result = METHOD.analyse(Evidence(calibrations=thesis(sd=0.0005)), METHOD.params(), None)
     notes = {c.name: c.note for c in result.checks}

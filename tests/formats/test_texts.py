@@ -9,8 +9,7 @@ import pytest
 
 from bench_service.formats.chunk import sample_type
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.export import export, extract
-from bench_service.formats.export_format import ExportFormat
+from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.logs.oxts import OXTS
 from bench_service.formats.proposal.model import Proposal
 from procedures.core.recording import Channel, Quantity, RecordingInfo

@@ -7,12 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from bench_service.formats.calibration_exports.own_json import own_json
+from tests.kit.exported_calibrations import a_subject
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "library.md"
 
 
 def test_the_lines_of_the_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "U-1-json.json").write_text(own_json(a_subject()))
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
     assert len(blocks) >= 4
     names: dict[str, object] = {}

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from bench_service.cli.printing.tables import budget_table, check_table
+from bench_service.cli.printing.check_tables import budget_table, check_table
 from procedures.core.limits import coverage_factor
 from tests.service.client import FAST, Client
 

@@ -40,14 +40,12 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         seen.append("shut down")
 
     @contextmanager
-    def opened(*_: object) -> Generator[tuple[uvicorn.Server, MagicMock]]:
+    def opened(*_: object) -> Generator[tuple[uvicorn.Server, MagicMock, MagicMock]]:
         if "early" in seen:
             os.kill(os.getpid(), signal.SIGHUP)
         app = FastAPI(lifespan=lifespan)
-        yield (
-            serving._Server(uvicorn.Config(app, port=0, log_config=None)),
-            MagicMock(**{"failed_start.return_value": None}),
-        )
+        started = MagicMock(**{"failed_start.return_value": None, "failure.return_value": None})
+        yield serving._Server(uvicorn.Config(app, port=0, log_config=None)), started, started
         os.kill(os.getpid(), signal.SIGHUP)  # as terminal and shell do: both send one
         os.kill(os.getpid(), signal.SIGTERM)
         seen.append("closed")

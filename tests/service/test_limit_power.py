@@ -1,12 +1,17 @@
 """Foresight of limits against draws of the measured value, and the decision rule against its definition."""
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
+from pydantic_core import to_jsonable_python
 
-from bench_service.campaigns.campaign import DecisionRule, StepLimit
+from bench_service.campaigns.campaign import Campaign, DecisionRule, StepLimit
 from bench_service.campaigns.decision import decided, rule_of
+from bench_service.campaigns.judgement import Judgement, judge
 from bench_service.campaigns.power import beyond, preview, smallest_step
-from procedures.core.limits import Limit, PlannedCheck, check
+from procedures.core.limits import Limit, PlannedCheck, Verdict, check
 
 DRAWS = 40_000
 SURE = 4.0
@@ -75,3 +80,25 @@ def test_a_limit_may_have_a_rule_of_its_own() -> None:
     assert decided(made, rule_of(own["guarded"], DecisionRule())).passed is False
     assert decided(made, rule_of(own["simple"], DecisionRule(rule="guarded"))).passed is True
     assert decided(made, rule_of(own[None], DecisionRule(rule="guarded"))).passed is False
+
+
+def test_a_campaigns_limit_on_what_was_not_observed_is_inconclusive_above_it() -> None:
+    """The step is in error and its reason names the check; a failed check beside it makes the step a failure."""
+    walk = check("gyro_x random walk", 0.002, Limit("deg/h", maximum=0.003))
+    bound = check("gyro_x bias instability", 0.05, Limit("deg/h", maximum=0.1), bound=True)
+    document = {"checks": to_jsonable_python([walk, bound])}
+    result: Any = SimpleNamespace(verdict=Verdict.PASS, document=document)
+
+    def judged(*limits: tuple[str, float]) -> Judgement:
+        wanted = [{"quantity": q, "unit": "deg/h", "maximum": m, "source": "ours"} for q, m in limits]
+        step = {"name": "static", "procedure": "static_run", "limits": wanted}
+        campaign = Campaign.model_validate({"name": "trial", "steps": [step]})
+        return judge(campaign.steps[0], campaign, result, cast(Any, None))
+
+    assert judged((bound.name, 0.06)).verdict is Verdict.PASS
+    undecided = judged((bound.name, 0.04))
+    assert (undecided.verdict, undecided.reason) == (
+        Verdict.ERROR,
+        "gyro_x bias instability, campaign's limit is inconclusive",
+    )
+    assert judged((bound.name, 0.04), (walk.name, 0.001)).verdict is Verdict.FAIL

@@ -104,7 +104,7 @@ def test_a_lease_from_home_to_its_end(client: Client, folder: Path) -> None:
     done = hand.answered("go_to", middle_deg=30.0, inner_deg=-45.0)
     assert (done["state"], done["text"]) == ("done", "at rest at 0.0000, 30.0000, -45.0000 deg")
     assert hand.answered("supply_on")["state"] == "done"
-    assert hand.answered("chamber", temperature_c=40.0)["text"].startswith("led to 40 °C at ")
+    assert hand.answered("chamber", temperature_c=40.0)["text"].startswith("commanded to 40 °C at ")
     rate = hand.ask("rate", axis="outer", rate_deg_s=10.0, duration_s=200.0).json()
 
     def read_out() -> dict[str, Any] | None:
@@ -112,7 +112,8 @@ def test_a_lease_from_home_to_its_end(client: Client, folder: Path) -> None:
         known = live["manual"] and live["manual"]["sensors"]
         return live if known and abs(live["devices"]["rates_deg_s"][0] - 10.0) < 0.01 else None
 
-    live = _until(read_out)
+    turning_s = _until(read_out)["manual"]["sensors_at_s"]  # the sensors' mean may still be of the ramp
+    live = _until(lambda: (new := read_out()) and new["manual"]["sensors_at_s"] > turning_s + 0.3 and new)
     devices, manual = live["devices"], live["manual"]
     assert (manual["holder"], manual["doing"], manual["sensors_problem"]) == ("ann", "rate", "")
     assert devices["voltage_v"] == pytest.approx(28.0, abs=0.5)

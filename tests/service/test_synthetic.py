@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from bench_service.cli.printing.tables import check_table
+from bench_service.cli.printing.check_tables import check_table
 from bench_service.evidence.reports.result_report import verdict_blocks
 from bench_service.formats.printed.document import PrintedTable
 from procedures.core import units

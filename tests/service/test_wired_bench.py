@@ -214,7 +214,7 @@ def test_a_supply_and_a_chamber_switched_on_by_hand_are_found_and_made_safe(east
     service.at_start("east")
     assert len(stops) == 1
     assert "the supply is on, and was left off" in stops[0]
-    assert "the chamber is led to 70 °C, and was left standing still" in stops[0]
+    assert "the chamber is commanded to 70 °C, and was left standing still" in stops[0]
     assert (east.supply.state["on"], east.chamber.state["target"]) == (False, 22.0)
     state = east.register().read()
     assert state is not None

@@ -30,6 +30,7 @@ import psutil
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.wall_clock import monotonic_s, pause
+from simulators.served.pace import MADE_UP_S
 from tests.benchmarks.process import free_port
 from tests.conformance.served import served
 from tests.end_to_end.bench_process import BenchProcess
@@ -174,7 +175,10 @@ def _looked_at(bench: BenchProcess) -> Generator[psutil.Process]:
 def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) -> list[str]:
     """Run the soak; print its figures, and return what was not kept."""
     chance, samples, descriptors = Random(seed), Samples(), Descriptors()
-    with tempfile.TemporaryDirectory(prefix="wires-") as name, served(THERMAL_LANGUAGES, True, factor) as behind:
+    with (
+        tempfile.TemporaryDirectory(prefix="wires-") as name,
+        served(THERMAL_LANGUAGES, True, factor, made_up_s=MADE_UP_S) as behind,
+    ):
         folder, journal, faults = Path(name), Journal(behind), Faults(behind, Random(seed + 1), mean_s)
         file = bench_file(folder, behind, factor, after_demand_s=0.02)
         bench = BenchProcess(f"sqlite:///{folder / 'bench.sqlite'}", free_port(), folder, file=str(file))

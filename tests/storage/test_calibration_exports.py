@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import yaml
 
+import procedures.library as inertial
 from bench_service.formats.calibration_exports.algebra import inverse_model, triangle_and_rotation
 from bench_service.formats.calibration_exports.autopilots import lost
 from bench_service.formats.calibration_exports.forms import CalibrationForm, exported
@@ -119,6 +120,46 @@ def test_our_json_has_both_models_the_covariance_and_where_they_hold() -> None:
         assert found["lineage"]["recordings"][0]["content_hash"] == "f00d"
     assert "U = b + K·v" in document["formula"]["forward"]
     assert document["noise"]["gyro"]["process_noise_of_a_filter"]["rate"][0] == NOISE["gyro"][0].random_walk ** 2
+
+
+@pytest.mark.parametrize("triad", list(UNITS))
+def test_the_library_reads_our_json_back_to_the_last_bit(tmp_path: Path, triad: str) -> None:
+    subject, file = a_subject(seed=6), tmp_path / "made.json"
+    file.write_text(own_json(subject))
+    one = subject.triad(triad)
+    assert one is not None
+    made = inertial.load_calibration(str(file), triad)
+    assert (made.triad, made.unit, made.id, made.unusable) == (one.value, "U-1", f"c-{triad}", "")
+    v = inputs(triad, n=5)
+    np.testing.assert_allclose(made.correct(outputs(one.value, v)), v, rtol=0, atol=1e-13 * np.abs(v).max())
+    np.testing.assert_allclose(made.correct(outputs(one.value, v)[0]), v[0], rtol=0, atol=1e-13 * np.abs(v).max())
+    with pytest.raises(BadParameter, match="outputs"):
+        made.correct(v.T)
+
+
+def test_the_library_refuses_what_is_no_such_file_and_warns_of_one_that_is_not_for_use(tmp_path: Path) -> None:
+    both, alone, other = tmp_path / "both.json", tmp_path / "alone.json", tmp_path / "other.json"
+    both.write_text(own_json(a_subject()))
+    rejected = an_export(a_triad("gyro", 1), unusable="it was rejected")
+    alone.write_text(own_json(CalibrationSubject("U-1", 400.0, (rejected,), "c-gyro", "2026-02-01T00:00:00+00:00")))
+    with pytest.raises(BadParameter, match="the file has both"):
+        inertial.load_calibration(str(both))
+    with pytest.warns(UserWarning, match="NOT FOR USE: it was rejected"):
+        inertial.load_calibration(str(alone))
+    with pytest.raises(BadParameter, match="what the file has: gyro"):
+        inertial.load_calibration(str(alone), "accelerometer")
+    for content in (
+        "",
+        "[]",
+        "{}",
+        '{"format": "imucal", "version": 1}',
+        both.read_text().replace('"b": [', '"b": [1,'),
+    ):
+        other.write_text(content)
+        with pytest.raises(BadParameter, match="exported with format=json"):
+            inertial.load_calibration(str(other))
+    with pytest.raises(BadParameter, match="cannot be read"):
+        inertial.load_calibration(str(tmp_path / "none.json"))
 
 
 def test_the_covariance_of_the_inverse_is_that_of_chance_drawn_coefficients() -> None:

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 import sqlalchemy as sa
+from pydantic import TypeAdapter
 from pydantic_core import to_jsonable_python
 
 from bench_service.campaigns.stores import Stores
-from bench_service.model.context import CONTEXT, context_document, context_of, withheld_calibration
+from bench_service.model.context import context_document, context_of, withheld_calibration
 from bench_service.model.job import Job, JobState
 from bench_service.persistence import Database, open_stores
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
@@ -45,7 +46,9 @@ def insert(connection: sa.Connection, table: str, **values: Any) -> None:
 
 def old_context(used: str | None, values: tuple[TriadCalibration, ...]) -> dict[str, Any]:
     """A job's context as it was stored: with the calibrations in use, coefficients and all."""
-    document = CONTEXT.dump_python(Context(Unit("U-1", 400.0, (), calibrations=values), BENCH), mode="json")
+    document = TypeAdapter(Context).dump_python(
+        Context(Unit("U-1", 400.0, (), calibrations=values), BENCH), mode="json"
+    )
     unit = {k: v for k, v in document["unit"].items() if k not in ("calibration_ids", "withheld")}
     return {**document, "unit": {**unit, "calibration_id": used}}
 

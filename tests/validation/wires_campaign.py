@@ -31,6 +31,7 @@ from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.catalog import discover
 from procedures.core.recording import MemoryRecording, RecordingInfo, Station
 from procedures.procedure import Context
+from simulators.served.pace import MADE_UP_S
 from simulators.truth import declared_unit, default_unit
 from simulators.world import WorldConfig, build
 from tests.conformance.served import served
@@ -124,7 +125,7 @@ def compared(wired: Figures, inside: Figures, console: Console) -> list[str]:
 def _over_wires(factor: float, seed: int, told: Any) -> tuple[dict[str, Any], BenchDescription]:
     with (
         tempfile.TemporaryDirectory(prefix="wires-") as name,
-        served(LANGUAGES, factor=factor, world=WorldConfig(seed=seed)) as behind,
+        served(LANGUAGES, factor=factor, world=WorldConfig(seed=seed), made_up_s=MADE_UP_S) as behind,
     ):
         folder = Path(name)
         file = bench_file(folder, behind, factor, after_demand_s=0.02)

@@ -31,6 +31,7 @@ from procedures.bench import BenchNeeds
 from procedures.catalog import discover
 from procedures.core.errors import UnfitRecording
 from procedures.procedure import Context
+from simulators.served.pace import MADE_UP_S
 from simulators.truth import declared_unit, default_unit
 from simulators.world import WorldConfig
 from tests.conformance.served import Served, served
@@ -48,7 +49,7 @@ def response(pace: float, stands: bool, seed: int, parameters: dict[str, Any]) -
     """Run the procedure; the delays as a sentence, or that of the refusal. `pace`: of the world by the real clock."""
     with (
         tempfile.TemporaryDirectory(prefix="wires-") as name,
-        served(LANGUAGES, factor=pace, world=WorldConfig(seed=seed)) as behind,
+        served(LANGUAGES, factor=pace, world=WorldConfig(seed=seed), made_up_s=MADE_UP_S) as behind,
     ):
         folder = Path(name)
         file = bench_file(folder, behind, 1.0, after_demand_s=0.02)

@@ -36,6 +36,7 @@ from procedures.catalog import discover
 from procedures.core.recording import MemoryRecording
 from procedures.procedure import Context
 from simulators.served.at_once import at_once
+from simulators.served.pace import MADE_UP_S
 from simulators.truth import declared_unit, default_unit
 from simulators.world import WorldConfig, build
 from tests.conformance.served import Served, served
@@ -96,7 +97,7 @@ def over_wires(factor: float, seed: int, rate_hz: float) -> tuple[Cycle, BenchDe
     world = WorldConfig(seed=seed, sample_rate_hz=rate_hz)
     with (
         tempfile.TemporaryDirectory(prefix="wires-") as name,
-        served(LANGUAGES, thermal=True, factor=factor, world=world) as behind,
+        served(LANGUAGES, thermal=True, factor=factor, world=world, made_up_s=MADE_UP_S) as behind,
     ):
         folder = Path(name)
         file = bench_file(folder, behind, factor, after_demand_s=0.02)
@@ -114,7 +115,7 @@ def highest_factor(seed: int, rate_hz: float, told: Told) -> float:
     """Highest of `FACTORS` that this machine keeps while a listener takes the unit's frames. Raises `SystemExit`."""
     for factor in FACTORS:
         world = WorldConfig(seed=seed, sample_rate_hz=rate_hz)
-        with served(LANGUAGES, thermal=True, factor=factor, world=world) as behind:
+        with served(LANGUAGES, thermal=True, factor=factor, world=world, made_up_s=MADE_UP_S) as behind:
             behind.do(_switched_on)
             pause(1.0)  # the launch of the unit takes long once
             share = _given_up(behind, factor)

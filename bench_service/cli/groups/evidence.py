@@ -163,7 +163,7 @@ def results(
 
 
 def _print_budget(result: dict[str, Any], coefficient: str) -> None:
-    from bench_service.cli.printing.tables import budget_table
+    from bench_service.cli.printing.check_tables import budget_table
 
     try:
         console.print(budget_table(result["document"], coefficient))
@@ -172,8 +172,8 @@ def _print_budget(result: dict[str, Any], coefficient: str) -> None:
 
 
 def _print_result(name: str, result: dict[str, Any], as_json: bool) -> None:
+    from bench_service.cli.printing.check_tables import check_table, show_warnings
     from bench_service.cli.printing.report_tables import report_tables
-    from bench_service.cli.printing.tables import check_table, show_warnings
 
     if as_json:
         print(json.dumps(result, indent=2))

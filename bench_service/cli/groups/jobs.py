@@ -107,7 +107,7 @@ def follow(client: "httpx.Client", job: dict[str, Any], server: str | None, as_j
 
 def _print_end(job: dict[str, Any], result: dict[str, Any] | None, as_json: bool) -> int:
     from bench_service.cli.asking.watching import exit_code
-    from bench_service.cli.printing.tables import check_table, show_warnings
+    from bench_service.cli.printing.check_tables import check_table, show_warnings
 
     if as_json:
         print(json.dumps({"job": job, "result": result}, indent=2))

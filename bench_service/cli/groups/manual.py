@@ -170,7 +170,7 @@ def supply(
 @manual.command("read")
 def read(context: typer.Context, bench: Bench = None, server: Server = None, as_json: AsJson = False) -> None:
     """Read the devices as they are now: angles, rates, air, supply, the unit's channels, status words."""
-    from bench_service.cli.printing.live_table import live_table
+    from bench_service.cli.printing.tables import live_table
 
     with connect(context.obj, server, drive=False) as client:
         name = bench_of(client, context.obj, bench)

@@ -3,7 +3,6 @@
 import json
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -16,7 +15,9 @@ CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction"
 
 
 def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]] | None) -> tuple[Table, float]:
-    """Return the table of estimates ± σ, truths and errors in σ; and the largest error in σ (0 without truth)."""
+    """Return the table of estimate ± standard uncertainty σ, truth, error in sigmas; and the largest error in sigmas (0
+    without truth).
+    """
     table = Table(title="Coefficients, U = b + K·v")
     for column in ("coefficient", "unit", "estimate", "± σ", "truth", "error / σ"):
         table.add_column(column, justify="left" if column in ("coefficient", "unit") else "right", no_wrap=True)
@@ -37,59 +38,6 @@ def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]]
                 cells[4:] = [f"{_entry(true, channel, column) / scale:.7f}", f"{error:+.2f}"]
             table.add_row(*cells, end_section=index == len(COEFFICIENT_NAMES) - 1)
     return table, worst
-
-
-def check_table(document: dict[str, Any]) -> Table:
-    """Return the table of a result's checks, each value next to its limit with its source; the notes stand below."""
-    table = Table(title="Checks")
-    words = ("check", "unit", "source of the limit", "outcome")
-    for column in ("check", "value", "U", "limit", "unit", "source of the limit", "outcome"):
-        table.add_column(column, justify="left" if column in words else "right")
-    for check in document.get("checks", []):
-        limit = check["limit"]
-        bounds = [f"≥ {limit['minimum']:.4g}"] if limit["minimum"] is not None else []
-        bounds += [f"≤ {limit['maximum']:.4g}"] if limit["maximum"] is not None else []
-        made = check.get("decision") or {}
-        said = made.get("outcome") or ("pass" if check["passed"] else "fail")
-        undecided = check.get("bound", False) and not check["passed"]
-        outcome = Text(said, style="green" if check["passed"] else "yellow" if undecided else "red")
-        expanded = "" if made.get("expanded_uncertainty") is None else f"{made['expanded_uncertainty']:.2g}"
-        source = Text(limit.get("source", ""))
-        value = f"{'< ' if check.get('bound') else ''}{check['value']:.4g}"
-        table.add_row(check["name"], value, expanded, ", ".join(bounds), limit["unit"], source, outcome)
-    said: list[str] = []
-    if (statement := document.get("statement")) is not None:
-        said = [f"{statement['outcome']}; decision rule: {statement['rule']}; U: expanded uncertainty"]
-    notes = [f"{check['name']}: {check['note']}" for check in document.get("checks", []) if check.get("note")]
-    table.caption = Text("\n".join([*said, *notes]))
-    return table
-
-
-def budget_table(document: dict[str, Any], coefficient: str) -> Table:
-    """Return the uncertainty budget of one coefficient ("gyro.K11"). Raises `KeyError` with the names."""
-    parts = [*document.get("triads", []), document.get("gyro") or {}, document.get("accelerometer") or {}]
-    found = {b["coefficient"]: b for part in parts for b in part.get("budgets", [])}
-    if coefficient not in found:
-        raise KeyError(", ".join(found) or "none: the result has no budget")
-    budget = found[coefficient]
-    table = Table(title=f"Uncertainty budget of {coefficient}, {budget['unit']}")
-    for column in ("source", "value", "unit", "distribution", "divisor", "sensitivity", "contribution", "ν"):
-        table.add_column(column, justify="left" if column in ("source", "unit", "distribution") else "right")
-    for row in budget["rows"]:
-        figures = (f"{row[name]:.3g}" for name in ("divisor", "sensitivity", "contribution"))
-        freedom = "∞" if row["degrees_of_freedom"] is None else f"{row['degrees_of_freedom']:.3g}"
-        table.add_row(row["source"], f"{row['value']:.3g}", row["unit"], row["distribution"], *figures, freedom)
-    freedom = "∞" if budget["degrees_of_freedom"] is None else f"{budget['degrees_of_freedom']:.3g}"
-    total = f"{budget['standard_uncertainty']:.3g}"
-    table.add_row("root sum of squares", "", "", "", "", "", total, freedom, style="bold")
-    table.caption = f"U = {budget['expanded_uncertainty']:.3g} {budget['unit']}, k = {budget['coverage_factor']:.3g}"
-    return table
-
-
-def show_warnings(document: dict[str, Any], to: Console) -> None:
-    """Print the warnings of a result, which a person should read before trusting it."""
-    for warning in document.get("warnings", []):
-        to.print(Text(f"warning: {warning}", style="yellow"), soft_wrap=True)
 
 
 def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
@@ -271,4 +219,33 @@ def _table(*columns: str, title: str | None = None) -> Table:
     table = Table(title=title)
     for number, column in enumerate(columns):
         table.add_column(column, no_wrap=number == 0)
+    return table
+
+
+def live_table(bench: str, live: dict[str, Any]) -> Table:
+    """Return the table of a bench's live readings; one row a reading."""
+    table = Table(title=f"bench {bench}, {moment(live['at'])}")
+    table.add_column("reading")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit")
+    devices, manual = live["devices"], live["manual"]
+    rates = devices["rates_deg_s"] or (None, None, None)
+    for axis, rate in zip(("outer", "middle", "inner"), rates, strict=True):
+        table.add_row(f"{axis} angle", f"{devices[f'{axis}_deg']:.4f}", "deg")
+        if rate is not None:
+            table.add_row(f"{axis} rate", f"{rate:.4f}", "deg/s")
+    table.add_row("table", "moves" if devices["moving"] else "rests", "")
+    chamber = devices["chamber"]
+    if chamber is not None:
+        table.add_row("air", f"{chamber['air_c']:.2f}", "°C")
+        target = "off" if chamber["target_c"] is None else f"{chamber['target_c']:.2f}"
+        table.add_row("set point", target, "°C")
+    table.add_row("supply", "on" if devices["unit_on"] else "off", "")
+    for name, unit in (("voltage_v", "V"), ("current_a", "A")):
+        if devices[name] is not None:
+            table.add_row(f"supply {name.partition('_')[0]}", f"{devices[name]:.3f}", unit)
+    for sensor in [] if manual is None else manual["sensors"]:
+        table.add_row(sensor["name"], f"{sensor['value']:.6g}", sensor["unit"])
+    for word in devices["status"]:
+        table.add_row(f"{word['device']} {word['name']}", word["raw"], ", ".join(word["bits"]))
     return table

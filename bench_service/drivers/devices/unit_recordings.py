@@ -74,7 +74,7 @@ class UnitRecordings:
         return tuple(StatusWord(name, raw, bits) for name, raw, bits in self._stream.words())
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording with the next frame that comes, and return its stream of blocks. Raises `NotPowered`,
+        """Begin a recording with the first sample from now on, and return its stream of blocks. Raises `NotPowered`,
         `OutOfRange`. Implements `Imu.record`.
         """
         if not 0.0 <= duration_s < float("inf"):
@@ -86,13 +86,14 @@ class UnitRecordings:
             raise OutOfRange("station.temperatures = True: the frames of this unit hold no temperature")
         columns = None if warm or len(self._inertial) == len(self._all) else self._inertial
         self._stream.begin()
-        tape = Tape(max(1, min(MOST_HELD, round(HELD_S * self.rate_hz * self._context.time_factor))))
+        real_rate_hz = self.rate_hz * self._context.time_factor
+        most = max(1, min(MOST_HELD, round(HELD_S * real_rate_hz)))
+        start_s = self._context.clock.now_s()
+        tape = Tape(most, wall_clock.monotonic_s(), 1.0 / real_rate_hz)
         self._stream.record(tape)
         samples = round(duration_s * self.rate_hz)
         blocks = self._blocks(tape, samples, columns)
-        return Stream(
-            self._all if warm else self.channels, self.rate_hz, self._context.clock.now_s(), blocks, station, None
-        )
+        return Stream(self._all if warm else self.channels, self.rate_hz, start_s, blocks, station, None)
 
     async def _blocks(self, tape: Tape, samples: int, columns: list[int] | None) -> AsyncIterator[NDArray[np.int32]]:
         try:

@@ -36,11 +36,25 @@ class Tape:
 
     most: int
     """Largest number of frames that may wait."""
+    begin_s: float = 0.0
+    """Moment at which the recording begins, on the monotonic clock [s]: frames of samples before it are left out."""
+    interval_s: float = 0.0
+    """Real time from one frame to the next [s]; 0: not known, and no frame is left out."""
     blocks: deque[NDArray[np.int32]] = field(default_factory=deque[NDArray[np.int32]])
     held: int = 0
     failure: BenchError | None = None
     begun: bool = False
     """True once it has got a frame: what was lost before that is not lost to it."""
+
+    def before(self, frames: int, now_s: float) -> int:
+        """Number of the oldest of some frames, the newest of which came just now, that were sampled before the begin.
+
+        Frames gather for `LISTEN_S` before they are decoded, so the first ones may be as much older. The sample of the
+        k-th last of them began ``k·interval_s`` ago, but for the line's own delay and for half an interval.
+        """
+        if self.begun or self.interval_s == 0.0:
+            return 0
+        return frames - min(frames, max(0, round((now_s - self.begin_s) / self.interval_s)))
 
     def take(self, count: int) -> NDArray[np.int32]:
         """Remove the oldest frames, at most `count`, and return their counts, (n, channels)."""
@@ -83,6 +97,8 @@ class FrameStream:
         """Moment of the newest frame on the monotonic clock [s]; 0 before the first one."""
         self.last_valid_s = 0.0
         """Moment of the newest frames of which the last one is valid [s]; 0 before the first ones."""
+        self._gathered_s = 0.0
+        """Moment at which the newest bytes had come [s]."""
         self._newest: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
 
     @property
@@ -152,11 +168,14 @@ class FrameStream:
         decoder = self._opening(line)
         continuity = Continuity(decoder.modulus, decoder.step)
         self._decoder, self._problem = decoder, ""
+        self._gathered_s = wall_clock.monotonic_s()
         self._note("imu.linked", {})
         waiting = decoder.feed(b"")
         while not self._closing.is_set():
             self._put(waiting, decoder, continuity)
-            waiting = decoder.feed(_gathered(line))
+            data = _gathered(line)
+            self._gathered_s = wall_clock.monotonic_s()  # before they are decoded: the newest frame came just now
+            waiting = decoder.feed(data)
 
     def _put(self, decoded: Decoded, decoder: StreamDecoder, continuity: Continuity) -> None:
         """Give frames to the recordings. One before which something is missing ends them."""
@@ -189,9 +208,12 @@ class FrameStream:
             for tape in self._tapes:
                 if tape.failure is not None:
                     continue
+                counts = decoded.counts[tape.before(len(decoded.counts), self._gathered_s) :]
+                if len(counts) == 0:
+                    continue
                 tape.begun = True
-                tape.blocks.append(decoded.counts)
-                tape.held += len(decoded.counts)
+                tape.blocks.append(counts)
+                tape.held += len(counts)
                 if tape.held > tape.most:
                     tape.failure = Disconnected(
                         f"{self.named}: more than {tape.most} frames waited to be recorded; the last one that was kept "

@@ -80,8 +80,6 @@ def _detrended(y: Array) -> Array:
 
 def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
     """Cycles in the record of the most prominent mode; None where none is significant."""
-    from scipy.signal import zoom_fft  # with all of scipy's statistics: only where it is called
-
     power = np.abs(np.fft.rfft(y * taper)) ** 2
     power = power[:-1]
     around, _ = levels_around(power, 2.0, _MANY)
@@ -95,6 +93,8 @@ def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
     first = int(np.argmax(ratio))
     if ratio[first] <= 1.0:
         return None
+    from scipy.signal import zoom_fft  # with all of scipy's statistics: few records have such a line
+
     span = np.array([first - 1.0, first + 1.0]) / len(y)
     fine = np.abs(zoom_fft(y * taper, span * 2.0, _FINE, fs=2.0, endpoint=True))
     at = int(np.clip(np.argmax(fine), 1, _FINE - 2))
