@@ -103,18 +103,14 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Return the parameters with the dwell from the unit, site and table from the bench. Raises `BadParameter` for a
-    correction that the unit does not have.
-    """
+    """Return the parameters with dwell, site and table. Raises `BadParameter` for a correction that is missing."""
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
     return full.with_rule(context.unit, least_dwell_s(full.thermal_correction))
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Return the stations of the verification, one an orientation, in the order given. Raises `BadParameter` where the
-    dwell is not resolved.
-    """
+    """Return the stations, one an orientation, in order. Raises `BadParameter` where the dwell is not resolved."""
     if params.dwell_s is None:
         raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
     return tuple(
@@ -133,11 +129,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Return duration, the standard deviations of the magnitudes and of each coefficient's change since the
-    calibration.
-
-    Raises `NoCalibration`.
-    """
+    """Return duration, and standard deviations of the magnitudes and of each change. Raises `NoCalibration`."""
     params = resolve(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     uncertainties = tuple(u for plan in plans for u in (*_predicted(plan), *_predicted_changes(plan, params, context)))
@@ -157,9 +149,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Return the comparison of the corrected station means of both triads with gravity and the Earth's rate, by
-    magnitude. Raises `NoCalibration`, `UnfitRecording`.
-    """
+    """Return the corrected means' magnitudes, judged. Raises `NoCalibration`, `UnfitRecording`."""
     params = resolve(params, context)
     site = params.site(context)
     used = context.unit.thermal_correction if params.thermal_correction == "current" else None
@@ -198,9 +188,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
 
 
 def report(result: Result) -> Report:
-    """Return the report: checks, and out of sample what Tables 5.3, 5.4 and figures 5.6-5.12 of the thesis show in
-    sample.
-    """
+    """Return the report: checks, and out of sample what Tables 5.3, 5.4 and figures 5.6-5.12 show in sample."""
     magnitudes = [t.magnitudes for t in result.triads]
     figures = [figure for m in magnitudes for figure in pictures.magnitude_figures(m)]
     table = pictures.magnitude_table(magnitudes, "Verification, out of sample: other orientations and another launch")
