@@ -6,7 +6,7 @@ from functools import partial
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import Heartbeat, LiveBoard
 from bench_service.bench.processes import Watch
-from bench_service.bench.worker_patience import ending_s
+from bench_service.bench.worker_time_limits import ending_s
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
 from bench_service.collector import no_collection

@@ -13,8 +13,6 @@ from bench_service.bench.records_in_place import Unreadable, encoded, preallocat
 
 BEAT_S = 0.5
 """Interval between two heartbeats of a process that drives a bench [s, real time]."""
-SILENT_S = 10.0
-"""Silence after which a driving process is killed, while its bench is not safe [s]."""
 
 
 class HeartbeatFile:

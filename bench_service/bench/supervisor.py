@@ -17,14 +17,14 @@ from threading import Event, Lock, Thread
 
 from bench_service.background import NonBlockingQuery
 from bench_service.bench.devices import BenchDevices, DeviceState, commanded
-from bench_service.bench.heartbeat import SILENT_S, HeartbeatFile
+from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.make_safe import over_new_link
 from bench_service.bench.processes import Driving, ProcessIdentity, Watch, living
 from bench_service.bench.stop.channel import SUPERVISOR, WORKER, StopChannel
 from bench_service.bench.stop.exchange import StopExchange
 from bench_service.bench.stop.word import StopAnswer
 from bench_service.bench.supervisor_ports import Lease, Listener, SafetyBooks
-from bench_service.bench.worker_patience import HUNG_S, UNANSWERED_S, WorkerPatience
+from bench_service.bench.worker_time_limits import HUNG_S, SILENT_S, UNANSWERED_S, WorkerTimeLimits
 from bench_service.model.errors import BenchBusy, ServiceError
 from bench_service.wall_clock import monotonic_s
 
@@ -76,7 +76,7 @@ class Supervisor:
         self._channel = channel
         self._listener = listener
         self._exchange = StopExchange(channel, books)
-        self._patience = WorkerPatience(channel, heartbeat, unanswered_s, hung_s, silent_s)
+        self._limits = WorkerTimeLimits(channel, heartbeat, unanswered_s, hung_s, silent_s)
         self._linger_s = linger_s
         self._by = f"the supervisor, {ProcessIdentity.own()}"
         self._asked_books = NonBlockingQuery("books", self._ask_books)
@@ -132,7 +132,7 @@ class Supervisor:
             self._end_hung(now_s, worker, state, words)
             self._look_for_left(now_s, state)
         else:
-            self._patience.reset(now_s)
+            self._limits.reset(now_s)
             self._left_since_s = None
             self._gone_since_s = now_s if self._gone_since_s is None else self._gone_since_s
             if state is not None and not state.safe and now_s >= self._next_try_s:
@@ -189,12 +189,12 @@ class Supervisor:
     ) -> None:
         """Kill a worker with the devices' link that leaves them unsafe and is silent or hung, or answers no stop."""
         if state is None or not state.linked:
-            self._patience.reset(now_s)
+            self._limits.reset(now_s)
             return
-        why = self._patience.over(now_s, worker, words, self._stopped, state.safe)
+        why = self._limits.over(now_s, worker, words, self._stopped, state.safe)
         if why is not None and worker.kill():
             self._say(f"{worker} {why} ({', '.join(state.unsafe) or 'the devices are safe'}): killed", state.job)
-            self._patience.reset(now_s)
+            self._limits.reset(now_s)
 
     def _look_for_left(self, now_s: float, state: DeviceState | None) -> None:
         """Make devices safe that a living worker has left unsafe and given back: it does nothing more with them."""

@@ -12,7 +12,7 @@ import yaml
 
 from bench_service.api.http.door import may_listen
 from bench_service.bench.stop.messages import split_address
-from bench_service.bench.worker_patience import ENDING_S
+from bench_service.bench.worker_time_limits import ENDING_S
 from bench_service.cli.commands import app, run_command_line
 from bench_service.settings import Settings
 

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bench_service.bench.worker_patience import ENDING_S
+from bench_service.bench.worker_time_limits import ENDING_S
 from tests.end_to_end.bench_process import BenchProcess
 from tests.kit.command_line import Command, command_here, command_in, one_line
 

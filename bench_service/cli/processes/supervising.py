@@ -14,7 +14,7 @@ from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.listener import StopListener
 from bench_service.bench.stop.messages import made_secret
 from bench_service.bench.supervisor import Supervisor
-from bench_service.bench.worker_patience import hung_after_s
+from bench_service.bench.worker_time_limits import hung_after_s
 from bench_service.cli.processes.ending import ending_on_signals
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect

@@ -12,7 +12,7 @@ from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import RoadEnd, has_register, over_new_link, still_unsafe, whole_road
 from bench_service.bench.processes import ProcessIdentity
-from bench_service.bench.worker_patience import ENDING_S
+from bench_service.bench.worker_time_limits import ENDING_S
 from bench_service.jobs.manual.reader import LeaseReader
 from bench_service.jobs.manual.session import TIME_OVER, ManualSession
 from bench_service.jobs.stores import JobStores

@@ -11,7 +11,7 @@ from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.stop.channel import WORKER, StopChannel
 from bench_service.bench.stop.word import StopAnswer, StopWord
-from bench_service.bench.worker_patience import ENDING_S, HUNG_S, UNANSWERED_S, WorkerPatience, hung_after_s
+from bench_service.bench.worker_time_limits import ENDING_S, HUNG_S, UNANSWERED_S, WorkerTimeLimits, hung_after_s
 from bench_service.cli.processes import supervising
 from bench_service.drivers.composition import longest_safe_s
 from bench_service.drivers.device_register import DeviceRegister
@@ -29,7 +29,7 @@ def killed_after_s(folder: Path, hung_s: float, beats: bool) -> float | None:
     channel, heartbeat, worker = StopChannel(folder, "sim"), HeartbeatFile(folder, "sim"), ProcessIdentity.own()
     channel.prepare()
     heartbeat.prepare()
-    patience = WorkerPatience(channel, heartbeat, UNANSWERED_S, hung_s, silent_s=10.0)
+    patience = WorkerTimeLimits(channel, heartbeat, UNANSWERED_S, hung_s, silent_s=10.0)
     word = StopWord("smoke", "Olena", "http")
     assert channel.ask(word)
     channel.answer(WORKER, StopAnswer("the worker", frozenset({word.id})))

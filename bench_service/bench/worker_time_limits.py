@@ -11,6 +11,8 @@ from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.stop.channel import WORKER, StopChannel
 
+SILENT_S = 10.0
+"""Time without a heartbeat after which a worker is killed, while its bench is not safe [s]."""
 UNANSWERED_S = 3.0
 """Time that a worker may leave a stop unanswered, while it has the devices' link, before it is killed [s]."""
 HUNG_S = 10.0
@@ -37,8 +39,10 @@ def ending_s(safe_s: float) -> float:
     return max(ENDING_S, safe_s + 2.0 * MARGIN_S)
 
 
-class WorkerPatience:
-    """Counts the worker's delays on one bench against their limits."""
+class WorkerTimeLimits:
+    """Measures how long the worker has been overdue on one bench, against the time limits; the supervisor asks it at
+    each look.
+    """
 
     def __init__(
         self, channel: StopChannel, heartbeat: HeartbeatFile, unanswered_s: float, hung_s: float, silent_s: float
