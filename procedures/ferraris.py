@@ -27,7 +27,9 @@ class FerrarisLimits(Parameters):
     """Requirements on the calibration itself (this program's own)."""
 
     gyro_scale_3_sigma_ppm: float = Field(20.0, gt=0.0, le=1e6, description="three standard uncertainties")
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of each triad's residuals")
+    residual_p_value_min: float = Field(
+        0.001, ge=0.0, le=1.0, description="smallest p-value accepted for each triad's residuals"
+    )
     condition_max: float = Field(
         100.0, ge=1.0, le=1e9, description="largest condition number of the accelerometers' design"
     )

@@ -58,7 +58,9 @@ class FitParameters(JudgedParameters):
         "g_sensitivity of the gyros; each must be determined by the positions",
     )
     scalar_check: bool = Field(False, description="cross-check of the accelerometers with the magnitude alone")
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    residual_p_value_min: float = Field(
+        0.001, ge=0.0, le=1.0, description="smallest p-value accepted for the chi-square of the residuals"
+    )
     condition_max: float = Field(
         100.0, ge=1.0, le=1e9, description="largest condition number of the column-scaled design"
     )

@@ -37,7 +37,7 @@ class Statement:
 
 _SHOWN_WHERE_MADE = Field(
     exclude_if=lambda found: found is None,
-    description="statement of conformity; None without checks and in results of older versions",
+    description="Statement of conformity; null without checks and in results of older versions",
 )
 
 

@@ -1,4 +1,6 @@
-"""Limits on guesses: a name is locked after failures, longer each time; an address has so many attempts a minute."""
+"""Limits on log-in attempts: a name is locked after repeated failures, longer each time; an address may try `PER_MINUTE`
+times a minute.
+"""
 
 from collections import OrderedDict, deque
 from datetime import datetime, timedelta

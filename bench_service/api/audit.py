@@ -46,7 +46,9 @@ class AuditView(BaseModel):
     id: str
     at: datetime
     who: str = Field(description=f"Authenticated name; without accounts `{REQUESTED_BY}`, or the address of the client")
-    action: str = Field(description="The operation, as this document names it")
+    action: str = Field(
+        description="`operationId` of the request in this document, such as `cancel`; of other acts a name such as `stop`"
+    )
     target: str = Field(description="Path of the object of the operation, or of the object that it created")
     outcome: str = Field(description="Status code of the answer, or a word for entries that are not requests")
     detail: dict[str, Any]
@@ -84,8 +86,8 @@ STOP = "stop"
 STOP_S = 0.3
 """Longest time that the answer to a stop waits for its audit entry; a later entry is written all the same [s]."""
 STOPS_WAITING = 1000
-"""Maximum number of stops whose entries wait for a database that hangs; of further ones the log has the entry. A thread
-for each would leave none for the stops themselves, were somebody to send them by the thousand."""
+"""Maximum number of stops whose entries wait for a database that hangs; further entries go to the log. With one thread
+per entry, a client that sends thousands of stops would leave no thread for the stops themselves."""
 
 log = logging.getLogger(__name__)
 
@@ -160,7 +162,7 @@ class _Act:
 
     @property
     def who(self) -> str:
-        """The proved name; where nobody logs in the one that a client gives itself; else its address."""
+        """Authenticated name; without accounts the name that the client gave, else its address."""
         client = self.request.client
         return found_of(self.request.scope).name(self._claimed) or (client.host if client else "local")
 
@@ -207,4 +209,4 @@ class _Act:
 WITH_PASSWORD = frozenset({"log_in", "add_account", "change_account"})
 """Routes whose bodies have a password."""
 NO_SECRETS = ("name", "role", "team")
-"""Fields of those that an entry has."""
+"""Fields of the bodies of `WITH_PASSWORD` routes that the audit entry keeps; all others are dropped."""

@@ -1,9 +1,10 @@
 """Making a bench safe: the order of the steps, written once for every situation in which a bench must be made safe.
 
 1. Where a job's session has the devices' link: the step under way is left, the procedure is closed, and the devices
-   are made safe over that link, in the order of `procedures.bench.SAFE_ORDER`.
+   are made safe over that link: simulated ones in the order of `procedures.bench.SAFE_ORDER`, real ones at the same
+   time.
 2. The session's link is given back, so that nothing that still comes from the job reaches a device.
-3. Where a device did not answer over that link, or there was none: the same order over a link of its own.
+3. Where a device did not answer over that link, or there was none: the devices are made safe over a link of its own.
 
 A job's end, a stop, a start, the supervisor and a release all use this module. Only a job goes through all three steps;
 the others take the third alone. None of it needs a database.

@@ -18,7 +18,8 @@ UNANSWERED_S = 3.0
 HUNG_S = 10.0
 """Shortest time that a worker is given from seeing a stop until the bench is safe, before it is killed [s]."""
 MARGIN_S = 5.0
-"""Time beyond the declared time of the slowest device [s]: the work is left first, and the devices are read back."""
+"""Added to the declared time of the slowest device [s]: the worker first abandons its work, and reads the devices back
+afterwards."""
 ENDING_S = 20.0
 """Shortest time that a service that ends waits for its bench to be safe [s]."""
 COUNTED_S = 0.5

@@ -109,7 +109,11 @@ class Conductor:
         return bool(runs)
 
     def advance(self, run_id: str) -> None:
-        """Advance one run, step by step, until it waits for a job or a turn, or has ended; each change is stored."""
+        """Advance one run, step by step, until it has ended or must wait: for a job, a method, an earlier run of its
+        bench, or the release of a stop. Each change is stored.
+
+        For the conductor's own thread; others call `nudge`. Raises `ServiceError` where nothing can be stored now.
+        """
         campaigns = self._stores.campaigns
         while not self._ending.is_set():
             run = campaigns.run(run_id)

@@ -18,7 +18,7 @@ LISTED = 200
 APART = timedelta(hours=6)
 """Shortest time between the beginnings of two nightly checks of one database, by whichever process."""
 LOOK_S = 30.0
-"""Interval at which the nightly check looks at the clock [s]: it may be set."""
+"""Interval at which the clock is read again [s], because somebody may set it."""
 REST = 1.0
 """Rest after each recording at night, in units of the time that its check took."""
 
@@ -127,7 +127,9 @@ def sentence(report: UpkeepReport) -> str:
 
 
 class NightlyScrub:
-    """Thread that runs the check of the database each night, and gives way to everything else."""
+    """Thread that checks the database each night at a set time, then does the other work of the night. It rests after
+    each recording for as long as its check took, so that other work is not held up.
+    """
 
     def __init__(self, upkeep: UpkeepService, at: str, then: Callable[[Event], object] = lambda ending: None) -> None:
         """Set up with `at`, the time of day on this host's clock, "HH:MM"; empty: never.
@@ -146,9 +148,7 @@ class NightlyScrub:
             self._thread.start()
 
     def end(self) -> None:
-        """End the thread and wait for it; a check that is under way ends without a result after its present
-        recording.
-        """
+        """Ask the thread to end, without waiting; a check under way ends without a result after its present recording."""
         self._ending.set()
 
     def _run(self) -> None:
@@ -166,7 +166,7 @@ class NightlyScrub:
             except ServiceError as error:
                 log.warning("the nightly maintenance failed: %s", error)
             except Exception:
-                log.exception("the work of the night on the database")
+                log.exception("the nightly maintenance failed unexpectedly")
 
 
 def next_time(at: str, moment: datetime) -> datetime:

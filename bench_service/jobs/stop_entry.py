@@ -16,7 +16,8 @@ from bench_service.wall_clock import now
 REQUESTS = frozenset({"http", "page"})
 """Ways of a stop for which the audit trail already has an entry, as a request."""
 
-RESTORED = "the books did not have it: restored from the bench's device folder"
+_FROM_FOLDER = "restored from the bench's device folder"
+RESTORED = f"not in the database: {_FROM_FOLDER}"
 """Remark in the reason and in the audit trail of a stop that a restored database did not know."""
 
 log = logging.getLogger(__name__)
@@ -41,7 +42,8 @@ class StopEntry:
 
         A stop that was released before the entry is complete ends no job: the one that runs by then began after it.
         """
-        reason = f"{word.reason} ({RESTORED})" if word.restored and RESTORED not in word.reason else word.reason
+        marked = _FROM_FOLDER in word.reason  # also in the words of an older version, which began otherwise
+        reason = f"{word.reason} ({RESTORED})" if word.restored and not marked else word.reason
         stop = self._benches.stop_bench(BenchStop(bench_id, word.at, reason, by=word.by, id=word.id))
         running = self._queue.running(bench_id) if stop.stands else None
         if running is not None:
@@ -51,7 +53,9 @@ class StopEntry:
         return None if running is None else running.id
 
     def _note(self, word: StopWord, stop: BenchStop) -> None:
-        """Note in the audit trail a stop that no request's entry shows, or that the database took late or again."""
+        """Add an audit entry for a stop that no request's entry covers, or that reached the database late or by
+        restoration.
+        """
         late_s = ((stop.entered_at or word.at) - word.at).total_seconds()
         if late_s <= LATE_S and word.via in REQUESTS and not word.restored:
             return

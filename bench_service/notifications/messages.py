@@ -78,7 +78,7 @@ def of_disk(bench: str, free: int, at: datetime) -> Message:
 
 
 def digest(messages: list[Message], bench: str, at: datetime) -> Message:
-    """Make one message from many that came too fast, with the title and time of each."""
+    """Make one message from those above the hourly limit, with the title and time of each."""
     lines = [f"{one.at.isoformat(timespec='seconds')}  {one.title}" for one in messages]
-    title = f"{bench}: {len(messages)} messages that came too fast"
+    title = f"{bench}: {len(messages)} messages in one, because the hourly limit was reached"
     return Message(f"digest-{messages[0].key}", messages[0].kind, title, "\n".join(lines), bench, at, "/")

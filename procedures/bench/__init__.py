@@ -1,7 +1,7 @@
 """PORTS, the interfaces of a bench. A driver or a simulator implements them; a procedure sees only these."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from procedures.bench.chamber import Chamber
 from procedures.bench.clock import Clock
@@ -33,8 +33,9 @@ __all__ = [
     "Turntable",
 ]
 
-SAFE_ORDER = ("turntable", "chamber", "current_source", "supply")
-"""Order in which devices are made safe: what moves first, what only wastes energy last. Defined nowhere else."""
+SAFE_ORDER: Final = ("turntable", "chamber", "current_source", "supply")
+"""Devices that are made safe, in this order on a simulated bench: what moves first, what only wastes energy last. On a
+bench with real devices (`Bench.safe_s`) all are made safe at the same time."""
 
 
 @dataclass

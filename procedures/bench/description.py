@@ -76,7 +76,7 @@ class BenchDescription:
     devices: tuple[DeclaredDevice, ...] = ()
     """Devices of a bench that has a bench file, with their identities and certificates; empty: all are simulated."""
     expired_certificates: Literal["refuse", "warn"] = "refuse"
-    """Policy for a certificate that has expired: no job is planned, or its result is marked."""
+    """Policy for an expired certificate. refuse: no job is planned; warn: previews and results carry a warning."""
     no_thermal_jobs: str = ""
     """The reason why no job that reads temperatures can run here; empty: one can, where there is a chamber."""
     chamber_accuracy: ChamberAccuracy | None = None
@@ -91,7 +91,7 @@ class BenchDescription:
     def overdue(self, today: str) -> tuple[str, ...]:
         """Return a sentence for each certificate that has expired on a day (ISO 8601)."""
         return tuple(
-            f"the certificate {c.number} of the {d.name} expired after {c.due}"
+            f"the certificate {c.number} of the {d.name} has expired: it was valid until {c.due}"
             for d in self.devices
             if (c := d.certificate) is not None and c.overdue(today)
         )

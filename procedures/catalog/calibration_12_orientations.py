@@ -69,7 +69,9 @@ class Limits(Parameters):
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_bias_run_to_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_scale_run_to_run_ppm: float = Field(200.0, gt=0.0, le=1e6)
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    residual_p_value_min: float = Field(
+        0.001, ge=0.0, le=1.0, description="smallest p-value accepted for the chi-square of the residuals"
+    )
     condition_max: float = Field(
         100.0, ge=1.0, le=1e9, description="largest condition number of the column-scaled design"
     )

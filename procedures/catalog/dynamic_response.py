@@ -60,7 +60,9 @@ class Limits(Parameters):
     stamp_scatter_ms: float | None = Field(
         None, gt=0.0, le=1e4, description="largest scatter of the delay from recording to recording; None: not judged"
     )
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    residual_p_value_min: float = Field(
+        0.001, ge=0.0, le=1.0, description="smallest p-value accepted for the chi-square of the residuals"
+    )
 
 
 class Params(JudgedParameters):

@@ -53,7 +53,9 @@ class Limits(Parameters):
     """Requirements on the alignment and its agreement with the prediction (this program's own, none in the thesis)."""
 
     heading_sd_max_deg: float = Field(0.1, gt=0.0, le=180.0, description="expected of one alignment's heading")
-    prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the errors' chi-square")
+    prediction_p_value_min: float = Field(
+        0.001, ge=0.0, le=1.0, description="smallest p-value accepted for the chi-square of the errors"
+    )
 
 
 class Params(TableParameters):

@@ -55,7 +55,9 @@ class Limits(Parameters):
     scale_factor_3_sigma_ppm: float = Field(1.0, gt=0.0, le=1e6, description="three standard uncertainties")
     asymmetry_ppm: float = Field(10.0, gt=0.0, le=1e6)
     nonlinearity_ppm: float = Field(10.0, gt=0.0, le=1e6, description="largest nonlinear term at the reference rate")
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    residual_p_value_min: float = Field(
+        0.001, ge=0.0, le=1.0, description="smallest p-value accepted for the chi-square of the residuals"
+    )
 
 
 class Params(JudgedParameters):

@@ -60,9 +60,9 @@ ORIENTATIONS = tuple((40.0 * i, 10.0 * i, 20.0 * i) for i in range(9))
 
 
 _OF_PLAN = (
-    "None: the expanded uncertainty of the plan, which has the unit's change between launches and which a sound unit "
-    "exceeds with a chance of prediction_p_value_min; with 80 ppm of accelerometer scale factor a sound unit may "
-    "exceed 0.0005 m/s^2 in another launch"
+    "None: the limit is the expanded uncertainty predicted by the plan, including the unit's change between launches; "
+    "a sound unit exceeds it with probability prediction_p_value_min. A fixed 0.0005 m/s^2 may be exceeded by a sound "
+    "unit in another launch, if its accelerometers' scale factors change by 80 ppm"
 )
 
 
@@ -71,7 +71,9 @@ class Limits(Parameters):
 
     gyro_bias_in_run_deg_h: float | None = Field(0.015, gt=0.0, le=1e6, description=_OF_PLAN)
     accelerometer_bias_in_run_m_s2: float | None = Field(0.0005, gt=0.0, le=100.0, description=_OF_PLAN)
-    prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the errors' chi-square")
+    prediction_p_value_min: float = Field(
+        0.001, ge=0.0, le=1.0, description="smallest p-value accepted for the chi-square of the errors"
+    )
 
 
 class Params(TableParameters, DwellParameters):
@@ -177,7 +179,9 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
-    """Return the planned checks of the error per axis δ/√3, out of sample. Raises `NoCalibration`."""
+    """Return the planned checks of each triad: bias in run (error per axis δ/√3, out of sample), and the p-value of the
+    errors. Raises `NoCalibration`.
+    """
     params = resolve(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     level = params.limits.prediction_p_value_min
@@ -188,7 +192,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
 
 
 def report(result: Result) -> Report:
-    """Return the report: checks, and out of sample what Tables 5.3, 5.4 and figures 5.6-5.12 show in sample."""
+    """Return the report: diagnosis, and tables and figures of the thesis (5.3, 5.4; 5.6-5.12), here out of sample."""
     magnitudes = [t.magnitudes for t in result.triads]
     figures = [figure for m in magnitudes for figure in pictures.magnitude_figures(m)]
     table = pictures.magnitude_table(magnitudes, "Verification, out of sample: other orientations and another launch")

@@ -46,7 +46,7 @@ class Params(RecordedParameters):
     alignment_s: float = Field(600.0, ge=1.0, le=86_400.0, description="first part of the recording, for the alignment")
     cell_s: float = Field(2.0, ge=0.01, le=60.0, description="means that are navigated with")
     p_value_min: float = Field(
-        0.001, ge=0.0, le=1.0, description="least p-value of the last position's Mahalanobis distance"
+        0.001, ge=0.0, le=1.0, description="smallest p-value accepted for the last position's Mahalanobis distance"
     )
     drift_max_m: float | None = Field(None, gt=0.0, le=1e7, description="limit of the greatest distance from the start")
 

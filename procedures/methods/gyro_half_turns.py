@@ -51,18 +51,21 @@ class GyroChannel:
 
     channel: str
     horizontal: bool
+    """True for the two gyros whose axes are horizontal."""
     half_difference: float
     """Component of the Earth's rate along the channel at the unturned heading."""
     standard_uncertainty: float
     """Standard uncertainty from the scatter of the pairs."""
     lower: float
+    """Lower end of the interval of 95 %, with Student's factor for the number of pairs."""
     upper: float
-    """Interval of 95 %, Student's factor for the number of pairs."""
+    """Upper end of the interval of 95 %, with Student's factor for the number of pairs."""
     within_sd: float
     """Standard uncertainty expected from the noise within the recordings alone."""
     half_sum: float
     """Bias of the channel; that of the vertical one includes the Earth's vertical rate, where no latitude is given."""
     half_sum_sd: float
+    """Standard uncertainty of the half sum, from the scatter of the pairs."""
 
 
 class Result(Outcome):
@@ -71,6 +74,7 @@ class Result(Outcome):
     channels: tuple[GyroChannel, ...]
     pairs: int
     horizontal_rate_rad_s: float
+    """Horizontal part of the Earth's rate, from the two horizontal gyros."""
     horizontal_rate_sd_rad_s: float
     expected_rad_s: float | None
 

@@ -64,12 +64,13 @@ class AlignedAttitude:
     roll_sd_deg: float
     duration_s: float
     predicted_azimuth_error_deg: float | None
-    """Thesis 1.1, magnitudes added; None where the unit's noise is not known."""
+    """Predicted azimuth error, its parts added by magnitude (thesis 1.1); None where the unit's noise is not known."""
     predicted_azimuth_sd_deg: float | None
     """Predicted azimuth error with the parts as independent standard uncertainties."""
     magnitude_errors: tuple[float, float, float]
     """|f| − g [m/s²], |ω| − Ω and ω upwards − Ω·sin L [rad/s]."""
     magnitude_sd: tuple[float, float, float]
+    """Standard uncertainties of `magnitude_errors`, in the same order and units."""
     step_deg: float | None = None
     """Step of the attitude within the recording; zero: none was seen; None: too few samples to look."""
     step_at_s: float | None = None

@@ -71,8 +71,8 @@ def triad_figures(t: TriadSummary) -> tuple[Figure, ...]:
 
 
 def residual_figure(summary: TriadSummary) -> Figure:
-    """Return the figure of the residuals of the three channels per orientation, error bars one expected standard
-    deviation.
+    """Return the figure of the residuals of the three channels at each station; error bars: the expected standard
+    deviation of each residual.
     """
     c = summary.calibration
     unit, size = units.DISPLAY[c.output_unit]

@@ -163,7 +163,9 @@ class ControlledTable(SimTurntable):
                 state.interlock = OPEN
 
     def advance(self, ticks: int) -> Motion:
-        """Advance the table, and lock it once all axes rest."""
+        """Advance the table by some ticks. Once all axes rest it is locked: no longer stepped, its attitude
+        constant (see `simulators.turntable.device`).
+        """
         motion = super().advance(ticks)
         if self._paths is not None:
             self._unwind_paths()

@@ -153,7 +153,7 @@ class SimTurntable:
         )
 
     def read_angles(self) -> TableAngles:
-        """Read the axis angles from the encoders at this moment."""
+        """Return what the encoders read now, whole turns included, without the pointing error."""
         encoders = (self._plant.angles_rad - self._pointing + 2.0 * np.pi * self._turns) / units.DEG
         outer, middle, inner = encoders.tolist()
         return TableAngles(outer, middle, inner)

@@ -141,7 +141,7 @@ def test_a_certificate_is_overdue_after_its_day(tmp_path: Path, day: str, overdu
     text = TEXT.replace("[turntable]\n", "[turntable]\n" + certificate)
     found = described(read_bench_file(_file(tmp_path, text)), None)
     assert found.overdue(day) == (
-        ("the certificate AT-117 of the turntable expired after 2027-03-02",) if overdue else ()
+        ("the certificate AT-117 of the turntable has expired: it was valid until 2027-03-02",) if overdue else ()
     )
 
 

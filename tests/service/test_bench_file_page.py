@@ -22,7 +22,9 @@ def test_the_pages_example_is_a_bench_and_a_unit(tmp_path: Path) -> None:
     assert (found.id, found.origin, found.simulated) == ("east", "real", False)
     assert (found.accuracy.measured, found.accuracy.pointing_sd_arcsec) == (True, 0.3)
     assert {d.name for d in found.devices if d.certificate is not None} == {"turntable", "chamber", "site"}
-    assert found.overdue("2027-03-03") == ("the certificate AT-117 of the turntable expired after 2027-03-02",)
+    assert found.overdue("2027-03-03") == (
+        "the certificate AT-117 of the turntable has expired: it was valid until 2027-03-02",
+    )
     (declared,) = read_units(tmp_path / "units")
     assert (declared.serial, declared.averaging_time_s) == ("GL017", 70.0)
     assert declared.gyro is not None

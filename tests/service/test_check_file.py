@@ -68,7 +68,9 @@ def test_an_overdue_certificate_is_refused_or_warned_of(
         text.replace("[site]\n", f"[site]\n{certificate}") + f'[policy]\nexpired_certificate = "{policy}"\n'
     )
     assert _run(path) == code
-    assert f"{word}: the certificate G-1 of the site expired after 2020-01-31" in capsys.readouterr().out
+    assert (
+        f"{word}: the certificate G-1 of the site has expired: it was valid until 2020-01-31" in capsys.readouterr().out
+    )
 
 
 def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -83,7 +83,7 @@ def test_the_result_is_marked_and_says_which_angles_were_used(
     client, _ = east
     result = client.http.get(f"/api/v1/jobs/{done['id']}/result").json()
     warnings = result["document"]["warnings"]
-    assert warnings[0] == "the certificate AT-117 of the turntable expired after 2020-03-02"
+    assert warnings[0] == "the certificate AT-117 of the turntable has expired: it was valid until 2020-03-02"
     assert warnings[1] == "the angles are those that the table's encoders measured, at all 2 stations"
 
 
@@ -172,4 +172,4 @@ def test_an_overdue_certificate_refuses_a_job_where_the_policy_says_so(
     planner = Planner(_Units(), directory, Catalogue())  # pyright: ignore[reportArgumentType]
     plan = planner.plan("calibration_12_orientations", "SIM-0001", {})
     assert plan.parameters.model_dump()["pointing_sd_arcsec"] == 0.5
-    assert plan.violations[0] == "the certificate AT-117 of the turntable expired after 2020-03-02"
+    assert plan.violations[0] == "the certificate AT-117 of the turntable has expired: it was valid until 2020-03-02"

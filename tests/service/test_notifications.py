@@ -186,7 +186,11 @@ def test_a_flood_becomes_a_digest(tmp_path: Path, hook: _Hook) -> None:
     for number in range(10):
         box.put(message(f"m{number}", title=f"title {number}"))
     assert box.send(AT) == 0
-    assert [got["title"] for got in hook.got] == ["title 0", "title 1", "sim: 8 messages that came too fast"]
+    assert [got["title"] for got in hook.got] == [
+        "title 0",
+        "title 1",
+        "sim: 8 messages in one, because the hourly limit was reached",
+    ]
     assert all(f"title {number}" in hook.got[2]["text"] for number in range(2, 10))
     box.put(message("late"))
     assert box.send(AT + timedelta(minutes=59)) == 1

@@ -78,7 +78,8 @@ class StopRoads:
         elsewhere: Callable[[str], StopRoad | None] = lambda _: None,
         where: Callable[[str], str] = lambda _: "",
     ) -> None:
-        """Set up with `folder`, the place of this host's stop channels, and `elsewhere`, which gives the way to others.
+        """Set up with `folder`, the place of this host's stop channels, and `elsewhere`, which returns the route
+        to a bench on another host.
 
         `where`: the name of that host, empty where it is not known.
         """
@@ -89,8 +90,8 @@ class StopRoads:
         self._channels: dict[str, StopChannel] = {}
 
     def channel(self, bench_id: str) -> StopChannel | None:
-        """The stop channel of a bench on this host; None where it has none here. Kept open, so that a stop
-        needs no new file descriptor.
+        """Return the stop channel of a bench; None where the bench has no device files on this host. It stays open, so
+        that a stop needs no new file descriptor.
         """
         with self._mutex:
             found = self._channels.get(bench_id)

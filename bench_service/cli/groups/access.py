@@ -19,7 +19,7 @@ from bench_service.cli.refusal import Refused
 
 users = typer.Typer(no_args_is_help=True, help="Accounts of people: the first one switches log-in on.")
 tokens = typer.Typer(no_args_is_help=True, help="Named tokens of programs.")
-trail = typer.Typer(no_args_is_help=True, help="The audit trail as a chain.")
+trail = typer.Typer(no_args_is_help=True, help="Check the audit trail, or close its old entries.")
 
 RoleOption = Annotated[Role, typer.Option(help="Role of the account or token")]
 TeamOption = Annotated[str, typer.Option(help="Team whose reservations count for it")]

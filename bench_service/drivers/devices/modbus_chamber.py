@@ -26,7 +26,7 @@ class ModbusSection(WireChamber):
     """Largest difference of a set point read back [°C]."""
 
     @model_validator(mode="after")
-    def _is_no_udp(self) -> "ModbusSection":
+    def _refuses_udp(self) -> "ModbusSection":
         if self.address.scheme == "udp":
             raise ValueError(f"address {self.address}: a Modbus device needs tcp or serial")
         return self
@@ -43,7 +43,7 @@ class ModbusChamber:
 
     @property
     def limits(self) -> ChamberLimits:
-        """Limits of demands: the section's, for a map has none."""
+        """Limits of demands: the section's; a register map declares none."""
         return limits_of(self._section.limits)
 
     async def connect(self) -> Found:
@@ -52,7 +52,9 @@ class ModbusChamber:
         return Found(await self.identify(), reading.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Return an empty identity: a Modbus map names no maker, the device is what its address says."""
+        """Return an identity with the model "Modbus chamber" only, for a register map has no maker or serial. Reads the
+        air temperature, so a chamber that does not answer raises.
+        """
         await self._line.read(self._map.actual)
         return DeviceIdentity(model="Modbus chamber")
 

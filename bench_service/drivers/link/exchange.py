@@ -31,7 +31,8 @@ class Request(Generic[T]):
     name: str
     """Name of the request in messages, as in "the set point"."""
     read: Callable[[bytes], T]
-    """Value of an answer. Raises `BadAnswer` where it is none to this request, `Refusal` where the device says no."""
+    """Function that returns an answer's value. Raises `BadAnswer` where the bytes do not answer this request, `Refusal`
+    where the device refuses."""
     demand: bool = False
     """True if it changes the device: such a request is never sent twice."""
     answered: bool = True
@@ -241,7 +242,7 @@ class Exchange:
                     return request.read(answer)
                 except BadAnswer as bad:
                     if not leave_out_others:
-                        raise _Lost(f"the answer to {request.name} is none: {bad}") from None
+                        raise _Lost(f"the answer to {request.name} cannot be understood: {bad}") from None
         except LineCut as cut:
             self.counts.cuts += 1
             raise _Lost(f"the connection was lost at {request.name}: {cut}") from None

@@ -86,7 +86,7 @@ class ModbusLine:
                 raise Disconnected(f"{self._named}: no answer to {name}: {lost}{more}") from None
             except BadAnswer as bad:
                 self._drop()
-                raise Disconnected(f"{self._named}: the answer to {name} is none: {bad}{more}") from None
+                raise Disconnected(f"{self._named}: the answer to {name} cannot be understood: {bad}{more}") from None
 
         if self._closed:
             raise Disconnected(f"the line of {self._named} was closed by the service")

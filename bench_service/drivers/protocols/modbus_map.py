@@ -33,7 +33,8 @@ class Register(BaseModel):
         return WORDS[self.type]
 
     def decode(self, registers: list[int]) -> float:
-        """Return the value in the registers. Raises `BadAnswer` where they are not as many as it has."""
+        """Return the value in the registers. Raises `BadAnswer` where their number or a value is
+        wrong, or the result is not finite."""
         if len(registers) != self.words or any(not 0 <= word <= 0xFFFF for word in registers):
             raise BadAnswer(f"{registers!r} are not the {self.words} registers at {self.address}")
         words = registers if self.word_order == "big" else registers[::-1]

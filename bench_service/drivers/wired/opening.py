@@ -15,11 +15,12 @@ from bench_service.drivers.wall_bench_clock import WallBenchClock
 from bench_service.drivers.wired.guarded import Guarded, GuardedTurntable
 from bench_service.drivers.wired.parallel import in_parallel
 from bench_service.model.errors import Misconfigured
+from procedures.bench import SAFE_ORDER
 
 READ: tuple[Kind, ...] = ("turntable", "chamber", "supply", "current_source", "environment")
 """Devices that have a state to read; a unit's link sends of itself."""
-SAFE: tuple[Kind, ...] = ("turntable", "chamber", "current_source", "supply")
-"""Devices that are made safe."""
+SAFE: tuple[Kind, ...] = SAFE_ORDER
+"""Kinds of the devices that are made safe."""
 
 
 def opened(file: BenchFile, kinds: Iterable[Kind], context: DriverContext) -> dict[Kind, Any]:

@@ -33,7 +33,7 @@ def psins(subject: CalibrationSubject) -> str:
         subject,
         "%",
         "PSINS has a lower triangular matrix of the accelerometers: its frame is Q times the unit's, K_a = L*Q",
-        "imuerrset draws no chance for vectors given like these; noise is zero where the unit's is not known",
+        "imuerrset draws no random errors for arguments that are vectors; noise is zero where the unit's is not known",
     )
     white = {name: [c.random_walk for c in channels] for name, channels in subject.noise.items()}
     lines += [

@@ -7,8 +7,8 @@ LEAST_DIGITS = 6
 
 
 def places(uncertainty: float | None) -> int | None:
-    """Return the number of decimals of the second significant digit of an uncertainty; None where there is none to
-    follow.
+    """Return the number of decimals that shows an uncertainty with two significant digits (negative: rounded to tens,
+    hundreds ...); None if it is absent, zero or not finite.
     """
     if uncertainty is None or not isfinite(uncertainty) or uncertainty <= 0.0:
         return None

@@ -26,11 +26,11 @@ class LaggedProducts:
     """``R(l) = Σ_k y_k y_{k+l}`` for l < `reach`, accumulated from pieces of any length; no sample is left out.
 
     Windows overlap by `reach` samples, so that every pair lies in one of them; pairs inside the overlaps, which lie in
-    two, are subtracted again.
+    two, are subtracted again. Call `add` for each piece, then `finish` once.
     """
 
     def __init__(self, reach: int, kernel: Array) -> None:
-        """`kernel` κ(l), (≤ reach,): see `energy`."""
+        """Set up; `kernel`: κ(l), (≤ reach,), weights of the sums in `energies`; see `averages.remainder_kernel`."""
         self._reach, self._length = reach, 1 << (SPAN * reach).bit_length() - 1
         self._window = self._length - reach
         self._rest = np.empty(0)

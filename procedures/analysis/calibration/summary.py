@@ -31,7 +31,7 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class StationResidual:
-    """Outputs minus model at one station, channels x, y, z, with their expected standard deviations."""
+    """Outputs minus model at one station, channels x, y, z, and the expected standard deviation of each residual."""
 
     label: str
     residual: tuple[float, ...]
