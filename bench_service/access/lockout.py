@@ -1,5 +1,5 @@
-"""Limits on log-in attempts: a name is locked after repeated failures, longer each time; an address may try `PER_MINUTE`
-times a minute.
+"""Limits on log-in attempts: a name is locked after repeated failures, longer each time; an address may try
+`PER_MINUTE` times a minute.
 """
 
 from collections import OrderedDict, deque

@@ -47,7 +47,8 @@ class AuditView(BaseModel):
     at: datetime
     who: str = Field(description=f"Authenticated name; without accounts `{REQUESTED_BY}`, or the address of the client")
     action: str = Field(
-        description="`operationId` of the request in this document, such as `cancel`; of other acts a name such as `stop`"
+        description="`operationId` of the request in this document, such as `cancel`; of other acts, a name such as "
+        "`stop`"
     )
     target: str = Field(description="Path of the object of the operation, or of the object that it created")
     outcome: str = Field(description="Status code of the answer, or a word for entries that are not requests")

@@ -148,7 +148,9 @@ class NightlyScrub:
             self._thread.start()
 
     def end(self) -> None:
-        """Ask the thread to end, without waiting; a check under way ends without a result after its present recording."""
+        """Ask the thread to end, without waiting; a check under way ends without a result after its present
+        recording.
+        """
         self._ending.set()
 
     def _run(self) -> None:
