@@ -79,9 +79,9 @@ class NoiseResult(Outcome):
     launches: tuple[LaunchNoise, ...]
     channels: tuple[ChannelSummary, ...]
     averaging_time_s: float | None
-    """The longest of the channels': the dwell that a calibration needs. None: quantization rules nowhere."""
+    """Longest averaging time of the channels, the dwell that a calibration needs; None: no channel has one."""
     drawn_launch: int = 1
-    """Number of the launch whose band, interval and lines are drawn."""
+    """Number, from 1, of the launch whose band, interval and lines are drawn."""
 
 
 R = TypeVar("R", bound=NoiseResult)

@@ -93,14 +93,14 @@ class Result(Outcome):
     time_s: tuple[float, ...]
     curves: tuple[Curve, ...]
     radius_95_m: tuple[float, ...]
-    """Circle about the true place that holds the navigator's with 95 %, at `time_s`."""
+    """Radius of the circle about the true place that holds the navigator's with 95 %, at `time_s`."""
     shares: tuple[Share, ...]
-    """Contributions by source, the greatest first; at one hour even where `hours` is less."""
+    """Contribution of each source to the position error, the greatest first; after one hour even if `hours` is less."""
     radius_95_1h_m: float
     calibration_radius_95_1h_m: float | None
-    """Radius of the calibration's own uncertainty alone, launch and noise left out."""
+    """Radius after one hour by the calibration's uncertainty alone, without launch and noise; None: no calibration."""
     uncalibrated_1h_m: float | None
-    """Position error of nominal outputs after an hour, where the equations still hold."""
+    """Position error of nominal outputs after one hour; None: no calibration, or too large for the equations."""
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:

@@ -89,7 +89,7 @@ class Result(Outcome):
 
     triads: tuple[FieldTriad, ...]
     tilt_deg: tuple[float, float] | None
-    """Tilt of the base (α₀, β₀)."""
+    """Tilt of the base (α₀, β₀); None: taken as level."""
     tilt_sd_deg: tuple[float, float] | None
     tilt_model: str
 

@@ -75,7 +75,7 @@ class Result(Outcome):
     velocity_north_m_s: tuple[float, ...]
     velocity_east_m_s: tuple[float, ...]
     radius_95_m: tuple[float, ...]
-    """Predicted circle about the start that holds the position with 95 %."""
+    """Predicted radius of the circle about the start that holds the position with 95 %, at `time_s`."""
     mahalanobis: float
     """Distance of the last position in standard deviations of the prediction, ``√(eᵀP⁻¹e)``."""
     p_value: float

@@ -84,8 +84,9 @@ class ChannelFound:
     coefficients: tuple[float, ...]
     covariance: tuple[tuple[float, ...], ...]
     before_sd: float
+    """Spread of the cells about each recording's mean, before correction."""
     after_sd: float
-    """Spread of the cells about each recording's mean, before and after correction."""
+    """Spread of the cells about each recording's mean, after correction."""
     p_unseen: float | None
     """p-value of "no dependence is left" in each recording after a fit to the others; None with a single recording."""
     soaks: tuple[SoakFit, ...]

@@ -62,10 +62,10 @@ def completed(document: Schema, catalogue: Catalogue) -> Schema:
         own[model.__name__] = extra
     names = _names(own)
     schemas = {names[name]: component(names[name], renamed(schema, names)) for name, schema in own.items()}
-    add_results(schemas, catalogue)
+    documents = add_results(schemas, catalogue)
     paths = renamed(_tidy_paths(document["paths"]), names)
     _describe_upload(paths, schemas)
-    describe(schemas)
+    describe(schemas, documents)
     declare_security(paths)
     return {
         **document,

@@ -48,12 +48,16 @@ _NOT_UNITS = ("_c", "_a", "_v", "_m", "_h")
 """Ends that are units only of numbers: a text may end so by chance."""
 
 
-def describe(schemas: dict[str, Schema]) -> None:
-    """Give every property of every schema a description, in place. One that nothing explains keeps none."""
+def describe(schemas: dict[str, Schema], documents: Mapping[str, type]) -> None:
+    """Give every property of every schema a description, in place. One that nothing explains keeps none.
+
+    `documents`: the classes of result documents by the names of their schemas, which differ from the classes' own.
+    """
     classes = _classes(frozenset(name.removesuffix("Input") for name in schemas))
     for name, schema in schemas.items():
         fields = schema.get("properties", {})
-        own = _of_class(classes.get(name.removesuffix("Input"), ()), fields)
+        named = (documents[name],) if name in documents else classes.get(name.removesuffix("Input"), ())
+        own = _of_class(named, fields)
         for field, inside in fields.items():
             text = inside.get("description") or own.get(field) or word(name, field)
             if text.startswith("["):  # a docstring that has the unit alone

@@ -12,10 +12,11 @@ RESULT = "ResultView"
 REFERENCE = PREFIX + "{model}"
 
 
-def add_results(schemas: dict[str, Schema], catalogue: Catalogue) -> None:
-    """Replace the general schema of a result by one of as many as there are procedures and methods.
+def add_results(schemas: dict[str, Schema], catalogue: Catalogue) -> dict[str, type]:
+    """Replace the general schema of a result by one of as many as there are procedures and methods. Return the classes
+    of their documents by the names of the documents' schemas.
 
-    Each is the general one with a fixed `kind` and `name`, and with the schema of its own `document`.
+    Each schema is the general one with a fixed `kind` and `name`, and with the schema of its own `document`.
     """
     general = schemas[RESULT]
     kinds = {"procedure": catalogue.procedures, "method": catalogue.methods}
@@ -32,6 +33,7 @@ def add_results(schemas: dict[str, Schema], catalogue: Catalogue) -> None:
         "oneOf": [{"$ref": reference} for reference in mapping.values()],
         "discriminator": {"propertyName": "name", "mapping": mapping},
     }
+    return {documents[name]: entry.result for entries in kinds.values() for name, entry in entries.items()}
 
 
 def _result(general: Schema, name: str, kind: str, entry: AnyProcedure | AnyMethod, document: str) -> Schema:

@@ -12,7 +12,7 @@ class ChannelResult(Part):
     name: str
     """Name of the procedure or method"""
     model: ConverterModel
-    """Model"""
+    """Model of the channel of the converter"""
     target_c: tuple[float, ...]
     """Temperature of the soak by the plan [°C]"""
     sensor_c: tuple[float, ...]
@@ -35,11 +35,11 @@ class ConverterBenchDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     channels: tuple[ChannelResult, ...]
     """Channels, in order"""
 

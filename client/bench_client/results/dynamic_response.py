@@ -71,7 +71,7 @@ class ChannelResponse(Part):
     degrees_of_freedom: int
     """Degrees of freedom"""
     p_value: float | None
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
     gain_p_value: float | None
     """Chance of the gains' residuals alone: small where the response is not that of one lag."""
     clock_difference_ppm: float
@@ -90,7 +90,9 @@ class DynamicResponse(Part):
     stamp_scatter_s: float
     """Standard deviation of the delay from recording to recording beyond the noise [s]; 0: none shows."""
     p_value_without_scatter: float | None
-    """Chance of so large a statistic by noise alone, without scatter between the frequencies"""
+    """p-value: probability that noise alone gives a statistic at least this large, without scatter between the
+    frequencies
+    """
     encoder_within_s: float
     """Mean of half the intervals in which the encoder was read [s]."""
     warnings: tuple[str, ...]
@@ -103,11 +105,11 @@ class DynamicResponseDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     gyro: DynamicResponse
     """Gyro triad"""
 

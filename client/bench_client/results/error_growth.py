@@ -21,7 +21,7 @@ class ResultShare(Part):
     """Contribution of one source alone: radii that hold the position with 95 %, in m."""
 
     source: str
-    """Source"""
+    """Source of the error"""
     after_1h_m: float
     """Share of the position error after one hour [m]"""
     at_end_m: float
@@ -34,31 +34,35 @@ class ErrorGrowthDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     basis: str
-    """Basis of the uncertainties, as a sentence"""
+    """Basis of the errors: a calibration, or declared values."""
     sentence: str
     """The finding, as a sentence"""
     schuler_period_s: float
     """Schuler period of the site [s]"""
     time_s: tuple[float, ...]
-    """Time [s]"""
+    """Times of `curves` and `radius_95_m`, from zero on [s]"""
     curves: tuple[NavigationGrowthSummaryCurve, ...]
     """Standard deviation of each error over time"""
     radius_95_m: tuple[float, ...]
-    """Radius that holds the position with 95 %, at each time [m]"""
+    """Radius of the circle about the true place that holds the navigator's with 95 %, at `time_s` [m]"""
     shares: tuple[ResultShare, ...]
-    """Share of each source in the position error"""
+    """Contribution of each source to the position error, the greatest first; after one hour even if `hours` is
+    less.
+    """
     radius_95_1h_m: float
     """Radius that holds the position with 95 % after one hour [m]"""
     calibration_radius_95_1h_m: float | None
-    """Radius of 95 % after one hour by the calibration's own uncertainty alone [m]"""
+    """Radius after one hour by the calibration's uncertainty alone, without launch and noise; None: no calibration
+    [m]
+    """
     uncalibrated_1h_m: float | None
-    """Radius of 95 % after one hour without any calibration; null: it could not navigate [m]"""
+    """Position error of nominal outputs after one hour; None: no calibration, or too large for the equations [m]"""
 
 
 class ErrorGrowthResult(ResultHead):

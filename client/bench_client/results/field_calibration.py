@@ -26,7 +26,7 @@ class FieldTriad(Part):
     degrees_of_freedom: int
     """Degrees of freedom"""
     p_value: float | None
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
     residuals: tuple[tuple[float, ...], ...]
     """Per recording, in the output's unit."""
     misfit: float | None = None
@@ -43,15 +43,15 @@ class FieldCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     triads: tuple[FieldTriad, ...]
     """Triads, one entry each"""
     tilt_deg: tuple[float, ...] | None
-    """Tilt of the base, α0 and β0; null: taken as level [deg]"""
+    """Tilt of the base (α₀, β₀); None: taken as level [deg]"""
     tilt_sd_deg: tuple[float, ...] | None
     """Standard uncertainty of the tilt [deg]"""
     tilt_model: str

@@ -23,11 +23,11 @@ class FreeInertialDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     basis: str
     """Basis of the uncertainties, as a sentence"""
     sentence: str
@@ -37,7 +37,7 @@ class FreeInertialDocument(Part):
     alignment_s: float
     """Duration of the alignment at the beginning of the recording [s]"""
     time_s: tuple[float, ...]
-    """Time [s]"""
+    """Times since the alignment's end at which all curves are given [s]"""
     north_m: tuple[float, ...]
     """Distance to the north from the start, at each time [m]"""
     east_m: tuple[float, ...]
@@ -49,11 +49,11 @@ class FreeInertialDocument(Part):
     velocity_east_m_s: tuple[float, ...]
     """Velocity to the east, at each time [m/s]"""
     radius_95_m: tuple[float, ...]
-    """Radius that holds the position with 95 %, at each time [m]"""
+    """Predicted radius of the circle about the start that holds the position with 95 %, at `time_s` [m]"""
     mahalanobis: float
-    """Mahalanobis distance of the last position; null: noise not known"""
+    """Distance of the last position in standard deviations of the prediction, ``√(eᵀP⁻¹e)``."""
     p_value: float
-    """Chance of so large a statistic by noise alone"""
+    """Chance of a distance at least as large; a lower figure where the noise is not known."""
     noise_known: bool
     """Whether the noise is that of the unit's record"""
 

@@ -12,15 +12,15 @@ class GyroChannel(Part):
     channel: str
     """Name of the channel"""
     horizontal: bool
-    """Horizontal rate found by half turns"""
+    """True for the two gyros whose axes are horizontal."""
     half_difference: float
     """Component of the Earth's rate along the channel at the unturned heading."""
     standard_uncertainty: float
     """Standard uncertainty from the scatter of the pairs."""
     lower: float
-    """Lower end of the interval"""
+    """Lower end of the interval of 95 %, with Student's factor for the number of pairs."""
     upper: float
-    """Interval of 95 %, Student's factor for the number of pairs."""
+    """Upper end of the interval of 95 %, with Student's factor for the number of pairs."""
     within_sd: float
     """Standard uncertainty expected from the noise within the recordings alone."""
     half_sum: float
@@ -28,7 +28,7 @@ class GyroChannel(Part):
     given.
     """
     half_sum_sd: float
-    """Standard deviation of the half sums"""
+    """Standard uncertainty of the half sum, from the scatter of the pairs."""
 
 
 class GyroHalfTurnsDocument(Part):
@@ -37,17 +37,17 @@ class GyroHalfTurnsDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     channels: tuple[GyroChannel, ...]
     """Channels, in order"""
     pairs: int
     """Number of pairs of opposite headings"""
     horizontal_rate_rad_s: float
-    """Horizontal rate of all channels; null: not both [rad/s]"""
+    """Horizontal part of the Earth's rate, from the two horizontal gyros [rad/s]"""
     horizontal_rate_sd_rad_s: float
     """Standard uncertainty of the horizontal rate [rad/s]"""
     expected_rad_s: float | None

@@ -61,17 +61,17 @@ class InitialAlignmentDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     basis: str
     """Basis of the uncertainties, as a sentence"""
     alignments: tuple[Alignment, ...]
     """Alignments in order"""
     angles: tuple[AngleErrors, ...]
-    """Errors of heading, pitch and roll over all alignments"""
+    """Errors of heading, pitch and roll."""
     thesis: ThesisPrediction | None
     """Azimuth error by thesis 1.1, for comparison"""
 

@@ -26,13 +26,15 @@ class AlignedAttitude(Part):
     duration_s: float
     """Duration [s]"""
     predicted_azimuth_error_deg: float | None
-    """Thesis 1.1, magnitudes added; None where the unit's noise is not known [deg]"""
+    """Predicted azimuth error, its parts added by magnitude (thesis 1.1); None where the unit's noise is not known
+    [deg]
+    """
     predicted_azimuth_sd_deg: float | None
     """Predicted azimuth error with the parts as independent standard uncertainties [deg]"""
     magnitude_errors: tuple[float, ...]
     """|f| − g [m/s²], |ω| − Ω and ω upwards − Ω·sin L [rad/s]."""
     magnitude_sd: tuple[float, ...]
-    """Standard uncertainty of the magnitude"""
+    """Standard uncertainties of `magnitude_errors`, in the same order and units."""
     step_deg: float | None = None
     """Step of the attitude within the recording; zero: none was seen; None: too few samples to look [deg]"""
     step_at_s: float | None = None
@@ -49,11 +51,11 @@ class InitialAlignmentOfRecordingDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     basis: str
     """Basis of the uncertainties, as a sentence"""
     attitudes: tuple[AlignedAttitude, ...]

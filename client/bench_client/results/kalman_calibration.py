@@ -57,7 +57,7 @@ class ChannelBias(Part):
     slow_noise_p_value: float
     """P-value of the scatter of ten parts of the recording: small where the channel wanders more than claimed."""
     time_s: tuple[float, ...]
-    """Time [s]"""
+    """Times since the recording's beginning [s]"""
     estimates: tuple[float, ...]
     """Estimates"""
     sds: tuple[float, ...]
@@ -72,15 +72,15 @@ class KalmanCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     biases: tuple[ChannelBias, ...]
     """Bias of each channel and recording"""
     failed_channels: tuple[str, ...] = ()
-    """Channels that failed a test"""
+    """Channels that fail the test of their innovations or of their slow noise, each once."""
 
 
 class KalmanCalibrationResult(ResultHead):

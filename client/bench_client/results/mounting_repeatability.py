@@ -18,9 +18,9 @@ class CrossCoupling(Part):
     sd: float
     """Repeatability: sample standard deviation of the mountings' means, ``√(Σ(m − m̄)²/(n − 1))`` [rad]."""
     low: float
-    """Lower end of the 95 % interval"""
+    """Lower end of the 95 % interval of the true standard deviation (chi-square, n − 1 degrees of freedom) [rad]."""
     high: float
-    """95 % interval of the true standard deviation, from chi-square with n − 1 degrees of freedom [rad]."""
+    """Upper end of the 95 % interval of the true standard deviation (chi-square, n − 1 degrees of freedom) [rad]."""
     within_sd: float | None
     """Pooled standard deviation of repeated calibrations under the same mounting [rad]; None: none was repeated."""
     within_degrees: int
@@ -37,13 +37,13 @@ class MountingRepeatabilityDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     mountings: tuple[str, ...]
-    """Mountings that took part, by id"""
+    """Ids of the mountings, in the order of their first calibration."""
     cross_couplings: tuple[CrossCoupling, ...]
     """Spread of each cross-coupling between mountings"""
 

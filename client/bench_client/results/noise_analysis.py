@@ -13,19 +13,19 @@ class NoiseAnalysisDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     launches: tuple[LaunchNoise, ...]
     """Launches, in order"""
     channels: tuple[ChannelSummary, ...]
     """Channels, in order"""
     averaging_time_s: float | None
-    """Averaging time at which quantization falls below the other noise [s]"""
+    """Longest averaging time of the channels, the dwell that a calibration needs; None: no channel has one [s]"""
     drawn_launch: int = 1
-    """Launch whose band and intervals are drawn, from 1"""
+    """Number, from 1, of the launch whose band, interval and lines are drawn."""
 
 
 class NoiseAnalysisResult(ResultHead):

@@ -42,11 +42,11 @@ class PlanOrientationsDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     model: str
     """Model of the plan: linear, linear_with_table or scalar"""
     total_s: float
@@ -54,7 +54,7 @@ class PlanOrientationsDocument(Part):
     plans: tuple[Plan, ...]
     """Plans"""
     recommended: int
-    """Name of the recommended plan"""
+    """Index of the recommended plan in `plans`."""
     sentence: str
     """The finding, as a sentence"""
 

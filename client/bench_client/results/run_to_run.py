@@ -20,17 +20,17 @@ class Scatter(Part):
     sd: float
     """``s = √(Σ(x − x̄)²/(n − 1))``."""
     low: float
-    """Lower end of the 95 % interval"""
+    """Lower end of the 95 % interval of the true standard deviation (chi-square, n − 1 degrees of freedom)."""
     high: float
-    """95 % interval of the true standard deviation, from chi-square with n − 1 degrees of freedom."""
+    """Upper end of the 95 % interval of the true standard deviation (chi-square, n − 1 degrees of freedom)."""
     expected_from_measurement: float
     """Standard deviation expected from the calibrations' uncertainties for a stable unit; an upper figure, since
     the constant flaws of one table repeat.
     """
     values: tuple[float, ...] = ()
-    """The coefficient in each calibration, and its standard uncertainty."""
+    """The coefficient in each calibration."""
     value_sds: tuple[float, ...] = ()
-    """Standard uncertainty of each value"""
+    """Standard uncertainty of each of `values`."""
 
 
 class RunToRunDocument(Part):
@@ -39,11 +39,11 @@ class RunToRunDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     scatters: tuple[Scatter, ...]
     """Scatter of each coefficient between the calibrations"""
 

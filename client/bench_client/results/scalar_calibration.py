@@ -25,19 +25,19 @@ class ScalarCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     calibration: TriadCalibration
     """Calibration of the triad"""
     parameters: tuple[Estimate, ...]
-    """The nine parameters"""
+    """b in the output's unit, s in SI per output unit, t in rad."""
     reference: float
     """Reference value: gravity or the Earth's rate"""
     poses: int
-    """Poses, in order"""
+    """Number of poses"""
     condition: float
     """Condition number of the column-scaled design"""
     chi_square: float
@@ -45,15 +45,15 @@ class ScalarCalibrationDocument(Part):
     degrees_of_freedom: int
     """Degrees of freedom"""
     p_value: float | None
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
     residuals: tuple[float, ...]
-    """Residuals at the stations, in their order"""
+    """|v̂| − reference per pose, SI."""
     residual_sd: tuple[float, ...]
-    """Standard deviation of the residuals"""
+    """Expected standard deviation of each residual"""
     misfit: float | None = None
-    """Residuals over what the scatter within the poses allows; null: not known"""
+    """Residuals over what the scatter within the poses allows; None where no equation is spare."""
     worst: str = ""
-    """Pose, or coefficient, with the largest residual"""
+    """Pose and channels with the greatest residual."""
 
 
 class ScalarCalibrationResult(ResultHead):

@@ -15,7 +15,7 @@ class Limit(Part):
     minimum: float | None = None
     """Smallest value; as a limit, null: none"""
     source: str = ""
-    """Source"""
+    """Where the limit comes from"""
 
 
 class Decision(Part):
@@ -123,7 +123,7 @@ class CalibrationSummaryCoefficient(Part):
 
 
 class StationResidual(Part):
-    """Outputs minus model at one station, channels x, y, z, with their expected standard deviations."""
+    """Outputs minus model at one station, channels x, y, z, and the expected standard deviation of each residual."""
 
     label: str
     """Name for people"""
@@ -147,7 +147,7 @@ class Magnitudes(Part):
     before: tuple[float, ...] | None
     """Magnitudes before correction; None where the outputs are in counts, which have none."""
     after: tuple[float, ...]
-    """Value after correction"""
+    """Magnitude at each station, after correction"""
     expected_sd: tuple[float, ...]
     """Standard deviations of the errors after correction; empty where the noise is not known."""
     mean_error_before: float | None
@@ -189,14 +189,14 @@ class ScalarCheck(Part):
     condition: float
     """Condition number of the column-scaled design"""
     p_value: float | None
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
 
 
 class BudgetRow(Part):
     """One source of uncertainty of one coefficient: value, distribution, divisor, sensitivity, contribution."""
 
     source: str
-    """Source"""
+    """Source of uncertainty"""
     value: float
     """Value of the source in `unit`: a standard deviation, or the limit of a rectangular distribution."""
     unit: str
@@ -221,7 +221,7 @@ class Budget(Part):
     unit: str
     """Unit of measurement"""
     rows: tuple[BudgetRow, ...]
-    """Rows"""
+    """Rows, one for each source"""
     standard_uncertainty: float
     """Root sum of squares of the contributions."""
     degrees_of_freedom: float | None
@@ -250,7 +250,7 @@ class TriadSummary(Part):
     degrees_of_freedom: int
     """Degrees of freedom"""
     p_value: float | None
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
     noise_known: bool
     """Whether the noise is that of the unit's record"""
     magnitudes: Magnitudes
@@ -284,7 +284,7 @@ class ThermalShare(Part):
     case_c: tuple[float, ...]
     """Case temperature at each station [°C]"""
     converter_c: tuple[float, ...]
-    """Temperature of the unit's signal converter [°C]"""
+    """Temperature of the unit's signal converter at each station [°C]"""
     change_m_s2: tuple[tuple[float, ...], ...]
     """Correction added to the outputs x, y, z of each station [m/s²]"""
     from_correction: dict[str, float]
@@ -351,7 +351,7 @@ class RatePoint(Part):
     """Scale factor of one axis at one rate and direction, as a departure from the fitted K."""
 
     axis: str
-    """Axis"""
+    """Axis of the unit"""
     rate_deg_s: float
     """Signed table rate [deg/s]."""
     turns: int
@@ -382,7 +382,7 @@ class WholeTurns(Part):
     degrees_of_freedom: int
     """Degrees of freedom"""
     p_value: float | None
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
     noise_known: bool
     """Whether the noise is that of the unit's record"""
     budgets: tuple[Budget, ...] = ()
@@ -397,7 +397,7 @@ class BandCurve(Part):
     least: tuple[float, ...]
     """Least deviation over every start"""
     mean: tuple[float, ...]
-    """Mean value"""
+    """Mean deviation over every start"""
     greatest: tuple[float, ...]
     """Greatest deviation over every start"""
 
@@ -447,9 +447,9 @@ class TemperatureRange(Part):
     """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
 
     case_c: tuple[float, ...]
-    """Temperature of the unit's case [°C]"""
+    """Lowest and highest reading of the case's sensor [°C]"""
     converter_c: tuple[float, ...]
-    """Temperature of the unit's signal converter [°C]"""
+    """Lowest and highest reading of the converter's sensor [°C]"""
 
 
 class SensorCorrection(Part):

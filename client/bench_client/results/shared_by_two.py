@@ -24,11 +24,11 @@ class FerrarisCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     gyro: WholeTurns
     """Gyro triad"""
     accelerometer: TriadSummary
@@ -77,11 +77,11 @@ class MultiPositionCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     triads: tuple[TriadSummary, ...]
     """Triads, one entry each"""
     extended: tuple[Extended, ...] = ()
@@ -121,7 +121,7 @@ class Exponential(Part):
     amplitude_sd: float
     """Standard uncertainty of the amplitude"""
     time_s: float
-    """Time [s]"""
+    """Time constant [s]"""
     time_sd: float
     """Standard uncertainty of the time constant, in seconds"""
 
@@ -209,9 +209,9 @@ class LaunchResultsCoefficient(Part):
     process: str
     """Noise process"""
     graphical: Reading
-    """Coefficient read off the plot; null: no straight stretch"""
+    """Coefficient read off the plot; its value is null without a straight stretch"""
     least_squares: Reading
-    """Coefficient by a non-negative fit of the deviation; null: absent"""
+    """Coefficient by a non-negative fit of the deviation; its value is null where it is absent"""
     likelihood: Reading
     """Coefficient by the likelihood of the spectrum, the efficient estimate"""
 
@@ -220,7 +220,7 @@ class Averaging(Part):
     """Averaging time from which on quantization lies below the rest; None, with the reason, where there is none."""
 
     time_s: float | None
-    """Time [s]"""
+    """Averaging time; null: none [s]"""
     standard_uncertainty_s: float | None
     """Standard uncertainty [s]"""
     reason: str = ""
@@ -242,7 +242,7 @@ class CorrelatedProcess(Part):
     """A Gauss–Markov process ``dx/dt = −x/τ + q·w`` in addition to the five."""
 
     time_s: float
-    """Time [s]"""
+    """Correlation time [s]"""
     time_sd_s: float | None
     """Standard uncertainty of the correlation time [s]"""
     driving: float
@@ -259,11 +259,11 @@ class TemperatureSlope(Part):
     channel: str
     """Name of the temperature channel."""
     slope: float
-    """Slope against temperature [rate/K] for a temperature in °C, else rate per count of it"""
+    """[rate/K] for a temperature in °C, else rate per count of it"""
     standard_uncertainty: float
     """Standard uncertainty, in the unit of the value"""
     p_value: float
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
 
 
 class LevelShift(Part):
@@ -287,7 +287,7 @@ class TemperatureCorrelation(Part):
     r: float
     """Pearson's coefficient of the means."""
     slope: float
-    """Slope against temperature [rate/K] for a temperature in °C, else rate per count of it"""
+    """[rate/K] for a temperature in °C, else rate per count of it"""
     slope_sd: float
     """Standard uncertainty, which allows for the autocorrelation of the channel's noise."""
     effective_samples: float
@@ -337,7 +337,7 @@ class ChannelNoise(Part):
     stages: tuple[Stage, ...]
     """Steps of the analysis, with curve and readings"""
     band: BandCurve
-    """Least, mean and greatest deviation over every start (paper A); null: not asked for"""
+    """Least, mean and greatest deviation over every start (paper A)"""
     coefficients: tuple[LaunchResultsCoefficient, ...]
     """Coefficients, with their uncertainties where they are estimates"""
     disagreements: tuple[str, ...]
@@ -410,7 +410,7 @@ class ChannelSummary(Part):
     rate_unit: str
     """Unit of the channel as a rate"""
     means: tuple[MeanCoefficient, ...]
-    """Mean of each channel"""
+    """Mean of each noise coefficient over the launches"""
     averaging_time_s: float | None
     """Averaging time at which quantization falls below the other noise [s]"""
     mean_change_sd: float | None

@@ -11,7 +11,7 @@ class SoakFit(Part):
     """Fit of a channel within one soak of one recording."""
 
     recording: int
-    """Recording, by its id"""
+    """Index of the recording, from 0"""
     temperature_c: float
     """Mean of the sensor [°C]"""
     from_below: bool | None
@@ -69,13 +69,13 @@ class ChannelFound(Part):
     f_tests: tuple[float, ...]
     """p-value of F tests of each order against the next lower one"""
     coefficients: tuple[float, ...]
-    """Coefficients, with their uncertainties where they are estimates"""
+    """Coefficients of the polynomial, from the first power on"""
     covariance: tuple[tuple[float, ...], ...]
     """Covariance matrix of the coefficients, in their order"""
     before_sd: float
-    """Standard deviation before correction"""
+    """Spread of the cells about each recording's mean, before correction."""
     after_sd: float
-    """Spread of the cells about each recording's mean, before and after correction."""
+    """Spread of the cells about each recording's mean, after correction."""
     p_unseen: float | None
     """p-value of "no dependence is left" in each recording after a fit to the others; None with a single
     recording.
@@ -92,11 +92,11 @@ class TemperatureDependenceDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     channels: tuple[ChannelFound, ...]
     """Channels, in order"""
     reference_c: float
@@ -104,11 +104,11 @@ class TemperatureDependenceDocument(Part):
     range_c: tuple[float, ...]
     """Range of the temperature [°C]"""
     thermometers: str
-    """Calibration of the thermometers"""
+    """Id of the calibration of thermometers that was used; empty: readings as they are."""
     gyro_correction: GyroThermalCorrection | None
     """Polynomials that correct the gyros; null: none was needed"""
     trace_c: tuple[tuple[float, ...], ...]
-    """Course of the temperature, thinned for drawing [°C]"""
+    """Temperature of each recording in cells, by the first channel's sensor [°C]"""
 
 
 class TemperatureDependenceResult(ResultHead):

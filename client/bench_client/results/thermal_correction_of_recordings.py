@@ -10,7 +10,7 @@ class AxisResult(Part):
     """Fit of one accelerometer: uncertainties, spread before and after, tests of the order."""
 
     axis: str
-    """Axis"""
+    """Axis of the unit"""
     standard_uncertainties: tuple[float, ...]
     """Standard uncertainties of α1 … α4, β1 … β4."""
     before_sd_m_s2: float
@@ -37,11 +37,11 @@ class ThermalCorrectionOfRecordingsDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     correction: ThermalCorrection
     """The correction"""
     axes: tuple[AxisResult, ...]
@@ -49,7 +49,7 @@ class ThermalCorrectionOfRecordingsDocument(Part):
     sensors: tuple[str, ...]
     """Thermometers, one entry each"""
     thermometers: str
-    """Calibration of the thermometers"""
+    """Id of the calibration of thermometers that was used; empty: readings as they are."""
 
 
 class ThermalCorrectionOfRecordingsResult(ResultHead):

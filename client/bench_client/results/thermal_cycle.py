@@ -23,9 +23,9 @@ class LegEvidence(Part):
     ended_s: float
     """End of the soak, since the recording began [s]"""
     case_c: float
-    """Temperature of the unit's case [°C]"""
+    """Mean temperature of the case over the criterion's window at the end of the soak [°C]"""
     converter_c: float
-    """Means over the criterion's window at the end [°C]"""
+    """Mean temperature of the converter over the criterion's window at the end of the soak [°C]"""
     case_slope_c_min: float
     """Drift of the case's temperature at the end of the soak [°C/min]"""
     converter_slope_c_min: float
@@ -84,7 +84,7 @@ class RunFound(Part):
     name: str
     """Name"""
     up: int
-    """Axis of the unit that stood upwards"""
+    """Index of the unit's axis that stood upwards: 0 x, 1 y, 2 z"""
     duration_s: float
     """Duration [s]"""
     force_m_s2: tuple[float, ...]
@@ -162,33 +162,33 @@ class CorrelationFound(Part):
     run: str
     """Run of the thermal cycle, by name"""
     axis: str
-    """Axis"""
+    """Axis of the unit"""
     r: float
     """Coefficient of correlation"""
     effective_samples: float
     """Number of independent samples that correlated noise leaves"""
     slope: float
-    """Slope against temperature [m/s² or rad/s a °C]"""
+    """[m/s² or rad/s a °C]"""
     slope_sd: float
     """Standard uncertainty of the slope"""
     p_value: float
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
 
 
 class AccelerometerCorrelation(Part):
     """Correlation of an accelerometer with temperature, before and after correction (thesis table 4.3)."""
 
     before: CorrelationFound
-    """Value before correction"""
+    """Correlation before correction"""
     after: CorrelationFound
-    """Value after correction"""
+    """Correlation after correction"""
 
 
 class GyroTemperature(Part):
     """Test of a gyro's independence of its temperature, over three runs together (thesis table 4.6)."""
 
     axis: str
-    """Axis"""
+    """Axis of the unit"""
     runs: tuple[CorrelationFound, ...]
     """Runs of the cycle"""
     p_value: float
@@ -205,7 +205,7 @@ class GyroNoise(Part):
     run: str
     """Run of the thermal cycle, by name"""
     axis: str
-    """Axis"""
+    """Axis of the unit"""
     quantization: float | None
     """Quantization noise Q"""
     random_walk: float | None
@@ -213,11 +213,11 @@ class GyroNoise(Part):
     bias_instability: float | None
     """Bias instability B"""
     uncertainties: tuple[float | None, ...]
-    """Standard uncertainty of each value"""
+    """Standard uncertainties of Q, N and B; null: not observed"""
     upper_limits: tuple[float, ...]
-    """What an unobserved process stays below (95 %)"""
+    """Upper limits of Q, N and B (95 %, one-sided), observed or not"""
     known: tuple[float, ...] | None
-    """Noise of the unit's record, for comparison"""
+    """Q, N and B of the unit's record, for comparison; null: not known"""
 
 
 class AllanFound(Part):
@@ -226,13 +226,13 @@ class AllanFound(Part):
     run: str
     """Run of the thermal cycle, by name"""
     axis: str
-    """Axis"""
+    """Axis of the unit"""
     tau_s: tuple[float, ...]
     """Averaging times [s]"""
     before: tuple[float, ...]
-    """Value before correction"""
+    """Deviation at each averaging time, before correction"""
     after: tuple[float, ...]
-    """Value after correction"""
+    """Deviation at each averaging time, after correction"""
     lower: tuple[float, ...]
     """Lower end of the interval"""
     upper: tuple[float, ...]
@@ -270,7 +270,7 @@ class Hysteresis(Part):
     run: str
     """Run of the thermal cycle, by name"""
     axis: str
-    """Axis"""
+    """Axis of the unit"""
     target_c: float
     """Temperature of the soak by the plan [°C]"""
     difference_m_s2: float
@@ -285,7 +285,7 @@ class GyroCorrected(Part):
     """Correction of a gyro that depends on temperature."""
 
     axis: str
-    """Axis"""
+    """Axis of the unit"""
     order: int
     """Order of the polynomial"""
     reason: str
@@ -302,7 +302,7 @@ class ThermalCycle(Part):
     judged: str
     """Judged correction: "fit" of this cycle, or "current" of the unit, which has not seen this cycle."""
     reference_c: tuple[float, ...]
-    """Temperature at which the correction does nothing [°C]"""
+    """Readings of case and converter sensor at which the correction changes nothing but K0 and B0 [°C]"""
     stage_one: bool
     """True if the converter's own model was taken out first."""
     force_known: bool
@@ -351,11 +351,11 @@ class ThermalCycleDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     cycle: ThermalCycle
     """Everything that the thermal cycle found"""
 

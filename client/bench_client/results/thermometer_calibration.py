@@ -12,19 +12,19 @@ class SensorFit(Part):
     channel: str
     """Name of the channel"""
     offset_c: float
-    """Offset of the sensor at the reference [°C]"""
+    """Error on the fitted line at the reference temperature [°C]"""
     offset_sd_c: float
-    """Standard uncertainty of the offset [°C]"""
+    """Standard uncertainty of that error [°C]"""
     slope: float
-    """Slope against temperature"""
+    """Slope of the error against the reading"""
     slope_sd: float
     """Standard uncertainty of the slope"""
     error_c: tuple[float, ...]
     """Reading at switching on less the chamber's air, at each soak [°C]"""
     error_sd_c: tuple[float, ...]
-    """Standard uncertainty of the error [°C]"""
+    """Standard uncertainty of each error [°C]"""
     residual_c: tuple[float, ...]
-    """Root mean square of the residuals [°C]"""
+    """Error less the fitted line, at each soak [°C]"""
     p_value: float
     """Chance of residuals as large, were all errors as large as claimed (chi-square of n − 2)."""
 
@@ -41,7 +41,7 @@ class UpAgainstDown(Part):
     standard_uncertainty_c: float
     """Standard uncertainty [°C]"""
     p_value: float
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
 
 
 class Calibrated(Part):
@@ -63,17 +63,17 @@ class ThermometerCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     thermometers: Calibrated
     """Calibration of the thermometers"""
     target_c: tuple[float, ...]
     """Temperature of the soak by the plan [°C]"""
     air_c: tuple[float, ...]
-    """Temperature of the chamber's air [°C]"""
+    """Chamber's own readings at the soaks [°C]"""
 
 
 class ThermometerCalibrationResult(ResultHead):

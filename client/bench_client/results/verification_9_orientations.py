@@ -67,7 +67,7 @@ class TriadVerification(Part):
     chi_square: float | None
     """Chi-square of the errors after correction against their predicted covariance; None for unknown noise."""
     p_value: float | None
-    """Chance of so large a statistic by noise alone"""
+    """p-value: probability that noise alone gives a statistic at least this large"""
     run_to_run_known: bool
     """False where the unit's record has no change from launch to launch: then the prediction holds in one launch
     only.
@@ -84,11 +84,11 @@ class Verification9OrientationsDocument(Part):
     checks: tuple[Check, ...] = ()
     """Values held to their limits"""
     verdict: Verdict
-    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
+    """Verdict of all checks: pass, fail or error"""
     warnings: tuple[str, ...] = ()
     """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """statement of conformity; None without checks and in results of older versions"""
+    """Statement of conformity; null without checks and in results of older versions"""
     triads: tuple[TriadVerification, ...]
     """Triads, one entry each"""
     dwells: DwellsSaved | None = None

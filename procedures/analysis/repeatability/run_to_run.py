@@ -24,14 +24,16 @@ class Scatter:
     sd: float
     """``s = √(Σ(x − x̄)²/(n − 1))``."""
     low: float
+    """Lower end of the 95 % interval of the true standard deviation (chi-square, n − 1 degrees of freedom)."""
     high: float
-    """95 % interval of the true standard deviation, from chi-square with n − 1 degrees of freedom."""
+    """Upper end of the 95 % interval of the true standard deviation (chi-square, n − 1 degrees of freedom)."""
     expected_from_measurement: float
     """Standard deviation expected from the calibrations' uncertainties for a stable unit; an upper figure, since the
     constant flaws of one table repeat."""
     values: tuple[float, ...] = ()
-    """The coefficient in each calibration, and its standard uncertainty."""
+    """The coefficient in each calibration."""
     value_sds: tuple[float, ...] = ()
+    """Standard uncertainty of each of `values`."""
 
     def resolves(self, limit: float) -> bool:
         """Return whether the measurement is finer than a limit on the standard deviation."""

@@ -30,8 +30,9 @@ class CrossCoupling:
     sd: float
     """Repeatability: sample standard deviation of the mountings' means, ``√(Σ(m − m̄)²/(n − 1))`` [rad]."""
     low: float
+    """Lower end of the 95 % interval of the true standard deviation (chi-square, n − 1 degrees of freedom) [rad]."""
     high: float
-    """95 % interval of the true standard deviation, from chi-square with n − 1 degrees of freedom [rad]."""
+    """Upper end of the 95 % interval of the true standard deviation (chi-square, n − 1 degrees of freedom) [rad]."""
     within_sd: float | None
     """Pooled standard deviation of repeated calibrations under the same mounting [rad]; None: none was repeated."""
     within_degrees: int

@@ -65,8 +65,9 @@ class LegEvidence:
     """Time when the criterion began to hold for good."""
     ended_s: float
     case_c: float
+    """Mean temperature of the case over the criterion's window at the end of the soak."""
     converter_c: float
-    """Means over the criterion's window at the end."""
+    """Mean temperature of the converter over the criterion's window at the end of the soak."""
     case_slope_c_min: float
     converter_slope_c_min: float
     air_c: float
