@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from procedures.bench.errors import OutOfRange
 
 SLICE_S = 10.0
-"""Longest bench time between two points where a cancellation can land [s]."""
+"""Longest bench time between two points at which a job can be cancelled [s]."""
 REAL_TIME_SLICE_S = 0.1
 """Longest real time between two such points, where the clock is asked to keep pace with real time [s]."""
 
@@ -51,7 +51,7 @@ class SimClock:
         slice_s: float | None = None,
         follows: Callable[[], float] | None = None,
     ) -> None:
-        """Start at tick 0. `real_time_factor`: bench seconds per real second, None: unlimited; `wait`: real seconds.
+        """Start at tick 0. `real_time_factor`: bench seconds a real second, None: unlimited; `wait` waits real seconds.
 
         `slice_s`: instead of `SLICE_S`. `follows`: bench time of another clock [s], which sleeping keeps pace with and
         `catch_up` moves the world to; it comes with a `wait`, and without a factor.
@@ -69,7 +69,7 @@ class SimClock:
         self._advance: Callable[[int], None] = lambda _ticks: None
 
     def connect(self, advance: Callable[[int], None]) -> None:
-        """`advance(ticks)` is called for every slice of time, before `now_s` shows it."""
+        """Set `advance(ticks)`, which moves the world: called for every slice of time, before `now_s` shows it."""
         self._advance = advance
 
     def now_s(self) -> float:
@@ -87,7 +87,7 @@ class SimClock:
         await self.pass_ticks(self.ticks_in(seconds))
 
     async def pass_ticks(self, ticks: int) -> None:
-        """Let the world continue for whole ticks; between slices a cancellation can land."""
+        """Let the world continue for whole ticks; between slices a job can be cancelled."""
         longest = SLICE_S if self._slice_s is None else self._slice_s
         if self._factor is not None:
             longest = min(longest, REAL_TIME_SLICE_S * self._factor)

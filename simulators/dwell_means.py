@@ -1,6 +1,6 @@
 """Station means of a whole run without samples, in milliseconds, for Monte Carlo over populations of units.
 
-The same truths, chance and moves as a world's (`simulators.world`), whose samples they replace.
+Truths, random numbers and moves are those of `simulators.world`, whose samples they replace.
 """
 
 from collections.abc import Sequence

@@ -110,9 +110,7 @@ class Conductor:
 
     def advance(self, run_id: str) -> None:
         """Advance one run, step by step, until it has ended or must wait: for a job, a method, an earlier run of its
-        bench, or the release of a stop. Each change is stored.
-
-        For the conductor's own thread; others call `nudge`. Raises `ServiceError` where nothing can be stored now.
+        bench, or the release of a stop. Each change is stored. For the conductor's own thread; others call `nudge`.
         """
         campaigns = self._stores.campaigns
         while not self._ending.is_set():

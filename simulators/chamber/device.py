@@ -51,7 +51,8 @@ class SimChamber:
         faults: tuple[ChamberFault, ...] = (),
         limits: ChamberLimits | None = None,
     ) -> None:
-        """Build the chamber device. `rate_hz`: ticks in a second; `now_s`: bench time; `limits`: None: the truth's."""
+        """Build the chamber device. `rate_hz`: ticks in a second; `now_s`: bench time; `limits`: of
+        demands; None: those of the truth."""
         self.truth, self.unit = chamber, unit
         self.plant = ChamberPlant(chamber, unit.network, seed)
         self.thermometers = Thermometers(unit.thermometers, seed, chamber.ambient_c)
@@ -71,7 +72,7 @@ class SimChamber:
         return DeviceIdentity("simulated", "thermal chamber")
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
-        """Go to an air temperature; see the port."""
+        """Command an air temperature and a ramp. Raises `OutOfRange`, `DeviceFault`. Implements `Chamber.command`."""
         self._need_link()
         most, s = self._limits, self.plant.state
         if not (isfinite(temperature_c) and most.minimum_c <= temperature_c <= most.maximum_c):
@@ -85,7 +86,7 @@ class SimChamber:
         self.plant.command(temperature_c, ramp_c_min / 60.0)
 
     async def read(self) -> ChamberReading:
-        """Read the chamber's own report of its state; see the port."""
+        """Return the chamber's own report of its state. Implements `Chamber.read`."""
         self._need_link()
         s = self.plant.state
         set_point = s.control_reading_c if s.target_c is None else s.set_point_c
@@ -103,7 +104,7 @@ class SimChamber:
         self.plant.follow(air_c)
 
     def unit_power(self, on: bool) -> None:
-        """Note that the unit's supply was switched: from the next second on it heats itself, or no more."""
+        """Note that the unit's supply was switched: it heats itself, or no longer does, from the next second on."""
         self.plant.state.unit_on = on
 
     def set_door(self, is_open: bool) -> None:
@@ -113,7 +114,7 @@ class SimChamber:
             self.plant.switch_off()
 
     def reset_limiter(self) -> None:
-        """Reset by hand after an over-temperature, in a person's place: for tests; nothing in the service can do it."""
+        """Reset the over-temperature limiter, as a person does by hand: for tests; the service cannot do it."""
         self.plant.state.tripped = False
         self.plant.switch_off()
 

@@ -86,7 +86,7 @@ class ChamberPlant:
         return path
 
     def follow(self, air_c: float) -> None:
-        """From now on the air is that of a real chamber, by its newest reading [°C]; this one controls nothing.
+        """Take the air's temperature from a real chamber's newest reading [°C] from now on, and control nothing.
 
         A unit that felt nothing yet has the temperature of the first reading throughout.
         """

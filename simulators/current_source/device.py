@@ -36,11 +36,11 @@ class SimCurrentSource:
         return DeviceIdentity("simulated", "current source")
 
     async def read(self) -> CurrentSourceReading:
-        """Read the present setting; see the port."""
+        """Return the present setting. Implements `CurrentSource.read`."""
         return CurrentSourceReading(self._now_s(), self._set_ma)
 
     async def set_current(self, current_ma: float) -> None:
-        """Set the current from now on; see the port."""
+        """Set the current from now on. Raises `OutOfRange`. Implements `CurrentSource.set_current`."""
         most = self._limits.maximum_ma
         if not (isfinite(current_ma) and abs(current_ma) <= most):
             raise OutOfRange(f"current_ma = {current_ma!r} is outside {-most:g} … {most:g}")

@@ -22,7 +22,7 @@ class Blocks:
     """
 
     def __init__(self, ticks: int, dtype: type[np.generic], fill: Callable[[int, NDArray[Any]], None]) -> None:
-        """`ticks` of a canonical block; `fill(block, values)` writes block number `block` into values (3, ticks)."""
+        """Set up; `ticks`: length of a canonical block; `fill(block, values)` writes one into values (3, ticks)."""
         self.ticks = ticks
         self._fill = fill
         self._values: NDArray[Any] = np.zeros((3, ticks), dtype)

@@ -1,6 +1,6 @@
 """Effect of temperature on a unit's outputs while some ticks pass: constant from one whole second to the next.
 
-Knows neither temperatures nor why; the code that wires the world asks the chamber's physics.
+It knows neither temperatures nor causes: the code that wires the world asks the chamber's physics.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class Drift:
 
 @dataclass(frozen=True)
 class Climate:
-    """Effect of some ticks on both triads, None: nothing; and the codes of the unit's temperature sensors meanwhile."""
+    """Effect of temperature on both triads during some ticks (None: no effect), and the codes of the unit's sensors."""
 
     gyro: Drift | None
     accelerometer: Drift

@@ -63,7 +63,8 @@ class ConverterLink:
         self._tapes.stop()
 
     def feel(self, ticks: int, current_ma: Callable[[], Array], lengths: Lengths, board_c: Array, sent: Counts) -> None:
-        """Pass some ticks: currents (ticks,) on demand, lengths of pieces, their board temperatures, and codes sent.
+        """Let some ticks pass, in pieces of `lengths` ticks with the board's temperatures `board_c` and the
+        thermometer's codes `sent`, both (pieces,); `current_ma` returns the currents, (ticks,).
 
         Codes are a function of current, temperature and moment alone, so none are made while no recording runs.
         """
@@ -79,7 +80,7 @@ class ConverterLink:
             tape.put(counts)
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording now; see the port."""
+        """Begin a recording now, of whatever station. Implements `Imu.record`."""
         self._tapes.need_power()
         if not 0.0 <= duration_s < float("inf"):
             raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")

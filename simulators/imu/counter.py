@@ -55,7 +55,7 @@ class Counter:
         self._reading: Counts = np.array(ahead, dtype=np.int32)
 
     def count(self, increments: Array, tick: int = 0, out: Counts | None = None) -> Counts:
-        """Counts of each sample, shape (3, n), from increments of shape (3, n) [rate·s] of the ticks from `tick` on.
+        """Return the counts of each sample, (3, n), from increments (3, n) [rate·s] of the ticks from `tick` on.
 
         `out`: where to write them. Raises `DeviceFault` where a sample is too large, with nothing counted.
         """

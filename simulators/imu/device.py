@@ -71,7 +71,7 @@ class SimImu:
         self._tapes.stop()
 
     def feel(self, motion: Motion, climate: Climate | None = None) -> None:
-        """Go through some motion, in some climate where the world has one; nothing happens while off."""
+        """Count what the unit senses during a motion, in a climate where the world has one; nothing while it is off."""
         if not self._sensors:
             return
         width = max((tape.columns for tape in self._tapes.running), default=len(self._channels))
@@ -88,7 +88,7 @@ class SimImu:
             tape.put(counts)
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording now; see the port. Time passes while its blocks are read.
+        """Begin a recording now; time passes while its blocks are read. Implements `Imu.record`.
 
         A station that wants temperatures gets their channels after the six, in whole seconds, held at the sample rate.
         """
@@ -114,7 +114,7 @@ class SimImu:
         return self._ticks / self.rate_hz
 
     def listen(self, tape: Tape) -> None:
-        """Give a tape all counts from now on, launch after launch; one that is wider than six gets temperatures too."""
+        """Send all counts to a tape from now on, in every launch; one of over six channels gets temperatures too."""
         self._tapes.running.append(tape)
 
     def sensor(self, triad: str) -> TriadSensor:

@@ -84,9 +84,10 @@ class TriadSensor:
     def feel(
         self, tick: int, ticks: int, increments: Array, out: Counts | None = None, drift: Drift | None = None
     ) -> Counts:
-        """Counts (3, ticks) of the ticks from `tick` since power-up, perhaps into `out`; true `increments` (ticks, 3).
+        """Return the counts (3, ticks) of the ticks from `tick` since power-up, in `out` where given.
 
-        Or (1, 3) where every tick is alike. `drift`: what temperature does to the triad meanwhile, None: nothing.
+        `increments`: true ones, (ticks, 3), or (1, 3) where every tick is alike; `drift`: effect of temperature on the
+        triad meanwhile, None: none.
         """
         if self._total.shape[1] != ticks:
             self._total = np.empty((3, ticks))

@@ -13,13 +13,13 @@ from simulators.imu.noise import TriadNoise
 from simulators.truth import Array, KeyedBlocks, TriadTruth
 
 BLOCK = 50_000
-"""Samples of a block."""
+"""Number of samples in a block."""
 _LEAST = 1e-300
-"""A triad's truth has pulses; these are none."""
+"""Quantization too small to matter: a triad's truth must have one, and the records get theirs separately."""
 
 
 def synthesise(noise: NoiseCoefficients, rate_hz: float, count: int, seed: int) -> Iterator[Array]:
-    """Rates of one channel in blocks, (n,) each, `count` in all; coefficients in SI as `NoiseCoefficients` has them.
+    """Yield the rates of one channel in blocks, (n,) each, `count` samples in all; `noise` is in SI.
 
     Library function: needs no bench and no unit. Raises `TruthError` for coefficients that are no noise.
     """

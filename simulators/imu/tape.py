@@ -14,7 +14,7 @@ BLOCK_S = 10.0
 
 @dataclass
 class Tape:
-    """Buffer of counts that a recording has not read yet: of its first channels, as many as it has."""
+    """Buffer of counts that a recording has not read yet; it keeps the first `columns` channels."""
 
     columns: int
     blocks: list[Counts] = field(default_factory=list)

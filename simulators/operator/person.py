@@ -1,6 +1,6 @@
 """Answers requests by itself: implements `procedures.bench.operator.Operator`.
 
-Knows the chamber's door, the unit's seat and its power only as verbs that are given.
+It knows the chamber's door, the unit's seat and its power only as functions that it is given.
 """
 
 from collections.abc import Callable
@@ -30,14 +30,14 @@ class SimOperator:
         door: Callable[[bool], None],
         place: Callable[[TableAngles, Array], None],
     ) -> None:
-        """Wire the operator to the bench. `is_on`: the unit has power; `door(open)`; `place(angles, lean)`: seat it."""
+        """Set up; `is_on()`: whether the unit has power; `door(open)`, `place(angles, lean)`: move door and unit."""
         self._truth, self._seed, self._clock = truth, seed, clock
         self._is_on, self._door, self._place = is_on, door, place
         self.settings = 0
         """Number of times that the unit was set by hand."""
 
     async def set_by_hand(self, angles: TableAngles, request: str) -> None:
-        """Set the unit by hand; see the port. The words of `request` are meant for a person.
+        """Set the unit by hand; `request`, a text for people, is not read. Implements `Operator.set_by_hand`.
 
         Raises `DeviceFault` while the unit is on or the table moves, `OutOfRange`. Even cancelled it closes the door.
         """

@@ -25,7 +25,7 @@ class AcutrolLanguage:
         self._table, self._numbers = table, numbers
         self._prefix, self._ending = PREFIX[:prefix_bytes].ljust(prefix_bytes, b"\0"), ending
         self.remote = True
-        """False while a person has the controller: the operator's own place at the machine."""
+        """False while a person operates the controller from its own panel."""
         self._verbs: dict[tuple[str, str], Callable[[list[str]], str]] = {
             ("utility", "lockout"): lambda _arguments: OK,
             ("mode", "off"): lambda a: self._mode(a, "off"),
@@ -147,7 +147,7 @@ class AcutrolLanguage:
 
 
 def _full(word: str, words: tuple[str, ...]) -> str:
-    """Full form of a word by any of its beginnings. Raises `ValueError`."""
+    """Return the full form of an abbreviated word. Raises `ValueError`."""
     for full in words:
         if word and full.startswith(word):
             return full

@@ -53,7 +53,7 @@ class Swing:
 
     @property
     def duration_s(self) -> float:
-        """Time until it stands still by itself: never."""
+        """Infinite, for it never stands still by itself."""
         return float("inf")
 
     @property
@@ -71,7 +71,7 @@ class Swing:
         return self.position + self.amplitude * size * np.sin(turn), self.amplitude * self.frequency_hz * rate
 
     def shifted(self, by: float) -> "Swing":
-        """The same motion, its positions called by other names."""
+        """Return the same motion with `by` added to every position."""
         return Swing(self.position + by, self.amplitude, self.frequency_hz, self.phase)
 
 
@@ -149,17 +149,17 @@ class Paths:
         return np.stack([position for position, _ in found], axis=1), np.stack([rate for _, rate in found], axis=1)
 
     def aged(self, by_s: float) -> "Paths":
-        """The same paths for a profile that begins later."""
+        """Return the same paths for a profile that begins `by_s` later."""
         first, second, third = self.ages_s
         return Paths(self.paths, (first + by_s, second + by_s, third + by_s))
 
     def shifted(self, by: Array) -> "Paths":
-        """The same paths, the positions called by other names."""
+        """Return the same paths with `by` added to the positions of each axis."""
         outer, middle, inner = (path.shifted(float(b)) for path, b in zip(self.paths, by, strict=True))
         return Paths((outer, middle, inner), self.ages_s)
 
     def replaced(self, axis: int, path: AxisPath) -> "Paths":
-        """These paths with another one of an axis, which begins now."""
+        """Return these paths with a new one for one axis, which begins now."""
         paths, ages = list(self.paths), list(self.ages_s)
         paths[axis], ages[axis] = path, 0.0
         return Paths((paths[0], paths[1], paths[2]), (ages[0], ages[1], ages[2]))

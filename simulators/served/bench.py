@@ -94,13 +94,13 @@ class ServedBench:
 
     @property
     def table(self) -> ControlledTable:
-        """The table, with what a person at the machine may do to it."""
+        """Return the served table, on which a person at the machine can act too: interlocks, setting by hand."""
         table = self.bench.turntable
         assert isinstance(table, ControlledTable)
         return table
 
     async def open(self) -> dict[str, int]:
-        """Open all ports and let time pass; the number of each device's port."""
+        """Open all ports and let time pass. Returns the port number of each device."""
         self._make_slow_things()
         numbers: dict[str, int] = {}
         for name, device in self.config.devices.items():
@@ -118,13 +118,13 @@ class ServedBench:
             await port.close()
 
     def check(self) -> None:
-        """Raise why the world does not continue, where it does not."""
+        """Raise the error that ended the passing of time, if there was one."""
         for task in self._tasks:
             if task.done() and not task.cancelled():
                 task.result()
 
     def break_now(self, fault: Fault) -> None:
-        """Let a fault of a device come true now."""
+        """Apply a fault to its device at once."""
         chamber = self.bench.chamber
         if fault.kind == "stuck_sensor" and fault.device == "turntable":
             self.table.stuck_deg = self.table.true_encoders_deg()

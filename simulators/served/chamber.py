@@ -39,7 +39,7 @@ class Controller:
         return self.reading().target_c is not None
 
     def set(self, temperature_c: float) -> bool:
-        """Set the set point; False: it is beyond the limits."""
+        """Set the set point. Returns False where it is beyond the limits, or is refused."""
         low, high = self.limits_c
         if not (isfinite(temperature_c) and low <= temperature_c <= high):
             return False
@@ -47,14 +47,14 @@ class Controller:
         return not self.running or self._lead()
 
     def set_gradient(self, which: int, k_min: float) -> bool:
-        """Set the gradient up (0) or down (1); False: it is beyond what the chamber can do."""
+        """Set the gradient up (0) or down (1). Returns False where it is beyond the limits, or is refused."""
         if not 0.0 < k_min <= self._chamber.limits.ramp_c_min:
             return False
         self.gradients[which] = k_min
         return not self.running or self._lead()
 
     def run(self, on: bool) -> bool:
-        """Start or stop; False: it is refused, as after a trip or with an open door."""
+        """Start or stop the plant. Returns False where that is refused, as after a trip or with an open door."""
         if on:
             return self.running or self._lead()
         self._chamber.plant.switch_off()
@@ -70,10 +70,10 @@ class Controller:
 
 
 class SimservLanguage:
-    """Numbered commands, one reply each; arguments that are not needed are let pass."""
+    """Numbered commands, one reply each; arguments that are not needed are ignored."""
 
     def __init__(self, controller: Controller, kind: str) -> None:
-        """Set up; `kind`: type that the chamber says of itself."""
+        """Set up; `kind`: type that the chamber reports."""
         self._c, self._type = controller, kind
         self._outputs = [False] * len(OUTPUTS)
         first = self._first
@@ -185,7 +185,7 @@ class ChamberTalker:
     """Both languages on one port: a dollar sign begins ASCII-2, a digit SIMSERV; anything else is no request."""
 
     def __init__(self, controller: Controller, kind: str = TYPE) -> None:
-        """Set up; `kind`: type that the chamber says of itself."""
+        """Set up; `kind`: type that the chamber reports."""
         self._simserv, self._ascii2 = SimservLanguage(controller, kind), Ascii2Language(controller)
 
     def take(self, buffer: bytearray) -> bytes | None:

@@ -16,7 +16,7 @@ that must meet a motion under way at a high factor has less: there a pause that 
 
 
 class PacedClock(SimClock):
-    """Clock on which waiting moves nothing: time passes by `go`, and who waits is woken."""
+    """Clock on which waiting moves nothing: time passes by `go`, which wakes the waiting tasks."""
 
     def __init__(self, rate_hz: float) -> None:
         super().__init__(rate_hz)
@@ -29,7 +29,7 @@ class PacedClock(SimClock):
             await self._passed.wait()
 
     def go(self, ticks: int) -> None:
-        """Let the world continue for whole ticks, and wake who waits."""
+        """Let the world continue for whole ticks, and wake the waiting tasks."""
         self.advance_world(ticks)
         passed, self._passed = self._passed, asyncio.Event()
         passed.set()

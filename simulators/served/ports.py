@@ -8,7 +8,7 @@ from simulators.clock import Wait
 from simulators.served.faults import Fault, FaultPlan
 
 MOST_WAITING = 8192
-"""Longest request that is gathered [bytes]."""
+"""Longest unfinished request [bytes]; a longer one closes its line."""
 
 
 class Talker(Protocol):
@@ -27,7 +27,7 @@ class LinePort:
     """Port of a device that answers requests. A second master finds its line closed at once."""
 
     def __init__(self, device: str, talker: Talker, plan: FaultPlan, wait: Wait, masters: int = 1) -> None:
-        """Set up; `wait`: waits real seconds, as a slow device does; `masters`: most lines at once."""
+        """Set up; `wait`: waits real seconds, as a slow device does; `masters`: largest number of open lines."""
         self._wait = wait
         self.device, self._talker, self._plan, self._masters = device, talker, plan, masters
         self._server: asyncio.Server | None = None
@@ -100,7 +100,7 @@ class LinePort:
 
 
 class Lines:
-    """Requests that end with one of some bytes; bytes that are blank alone are left out."""
+    """Requests that end with one of some bytes; blank requests are ignored."""
 
     def __init__(self, endings: bytes, answer: Callable[[bytes], bytes]) -> None:
         self._endings, self._answer = endings, answer

@@ -87,7 +87,7 @@ class ControlledTable(SimTurntable):
         ]
 
     def place(self, angles: TableAngles, lean_rad: Array) -> None:
-        """A person sets the unit by hand; the table stays as it is, and has the unit again with its next demand."""
+        """Set the unit by hand, as a person does; the table stays, and carries the unit again from its next demand."""
         before = self._before or _Mounted(
             self.true_encoders_deg(), self._plant.angles_rad.copy(), self._turns, self._pointing, self._lean
         )

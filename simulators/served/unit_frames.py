@@ -77,7 +77,7 @@ class CountFrames:
         return body + struct.pack("<H", crc16(body))
 
     def description(self) -> str:
-        """File that describes these frames to who reads them, TOML."""
+        """Return the TOML file that describes these frames to their reader."""
         length = self.length
         lines = [
             'name = "frames of the simulated unit"',

@@ -44,7 +44,7 @@ class SimSupply:
         return DeviceIdentity("simulated", "power supply")
 
     async def set_output(self, voltage_v: float, current_a: float) -> None:
-        """Set voltage and current limit; see the port."""
+        """Set voltage and current limit. Implements `Supply.set_output`."""
         if violations := self.limits.violations(voltage_v, current_a):
             raise OutOfRange("; ".join(violations))
         self._set = (voltage_v, current_a)
@@ -69,7 +69,7 @@ class SimSupply:
         return self._on
 
     async def read(self) -> SupplyReading:
-        """Measure the output; see the port."""
+        """Measure the output. Implements `Supply.read`."""
         voltage, limit = self._set
         wanted = voltage / self._load_ohm
         limiting = self._on and wanted > limit

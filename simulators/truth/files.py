@@ -234,7 +234,7 @@ def load_bench(path: Path) -> BenchTruth:
 
 @lru_cache(maxsize=1)
 def default_unit() -> UnitTruth:
-    """Return the shipped unit, "SIM-0001": one value, which nothing can change."""
+    """Return the shipped unit, "SIM-0001": always the same immutable value."""
     return parse_unit(_shipped("default_unit.toml"))
 
 

@@ -158,7 +158,7 @@ class AccelerometerThermalTruth:
     bias_dynamic: tuple[float, float] = (0.0, 0.0)
     """B's d1 [m/s²/°C] and d2 [m/s²/°C²]."""
     block_share: float = 0.0
-    """Structure that counts: 0 the case, where the sensor is, 1 the accelerometer block inside, which has none."""
+    """Share of the accelerometer block, which has no sensor, in t; the rest is the case's, which has one."""
 
     def __post_init__(self) -> None:
         within("accelerometer_thermal.block_share", self.block_share, 0.0, 1.0)

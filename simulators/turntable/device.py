@@ -45,7 +45,7 @@ def pointing_error_rad(table: TableTruth, seed: int, move: int) -> Array:
 
 
 class SimTurntable:
-    """Limits come before demands; a fault is kept, never reset by itself."""
+    """Three-axis table that checks its limits before each motion; a fault of the plant stays for good."""
 
     def __init__(self, truth: BenchTruth, seed: int, clock: SimClock) -> None:
         self._truth = truth
@@ -74,7 +74,7 @@ class SimTurntable:
         return self._profile is None
 
     async def move_to(self, angles: TableAngles) -> None:
-        """Move all axes, settle, lock; see the port."""
+        """Move all axes, settle, lock. Implements `Turntable.move_to`."""
         self._need_leave(self._description.violations(angles))
         self._moves += 1
         self._pointing = pointing_error_rad(self._truth.table, self._seed, self._moves)
@@ -84,7 +84,7 @@ class SimTurntable:
         await self._follow(Quintic(start, end, duration))
 
     async def command_turn(self, turn: Turn) -> None:
-        """Begin whole turns of one axis; see the port. The axis that turns stops with a new pointing error."""
+        """Begin whole turns of one axis, which stops with a new pointing error. Implements `Turntable.command_turn`."""
         self._need_leave(self._description.violations(self.read_angles(), turn))
         axis = AXES.index(turn.axis)
         self._moves += 1
@@ -95,7 +95,7 @@ class SimTurntable:
         self._begin(Spin(self._plant.angles_rad, axis, angle, turn.duration_s, turn.ramp_s))
 
     async def command_rate(self, rate: ConstantRate) -> None:
-        """Begin a constant rate of one axis; see the port. Its pointing error stays as it was."""
+        """Begin a constant rate of one axis, whose pointing error stays. Implements `Turntable.command_rate`."""
         self._need_leave(self._description.rate_violations(self.read_angles(), rate))
         axis = AXES.index(rate.axis)
         self._turned[axis] = self._description.axis(rate.axis).continuous
@@ -103,26 +103,26 @@ class SimTurntable:
         self._begin(Spin(self._plant.angles_rad, axis, angle, rate.duration_s, rate.ramp_s))
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
-        """Begin whole cycles of one axis; see the port."""
+        """Begin whole cycles of one axis. Implements `Turntable.command_sinusoid`."""
         self._need_leave(self._description.sinusoid_violations(self.read_angles(), sinusoid))
         amplitude = units.DEG * sinusoid.amplitude_deg
         axis = AXES.index(sinusoid.axis)
         self._begin(Sine(self._plant.angles_rad, axis, amplitude, sinusoid.frequency_hz, sinusoid.cycles))
 
     def trace(self) -> EncoderTrace:
-        """Readings of each tick of a sinusoid since the last call; see the port. They are timed exactly."""
+        """Return the readings of a sinusoid since the last call, one a tick, timed exactly. Implements `Turntable.trace`."""
         taken, self._traced = self._traced, NO_TRACE
         return taken
 
     async def settle(self) -> None:
-        """Let time pass until what was commanded is over and the axes rest; see the port."""
+        """Let time pass until the commanded motion is over and the axes rest. Implements `Turntable.settle`."""
         if self._fault:
             raise DeviceFault(self._fault)
         if self._profile is not None:
             await self._finish(self._profile, self._demand)
 
     def place(self, angles: TableAngles, lean_rad: Array) -> None:
-        """A person sets the unit by hand: as at these angles, leaning by a rotation vector (3,) in its own axes.
+        """Set the unit by hand as at these angles, leaning by a rotation vector (3,) in its own axes.
 
         No servo moves, no time passes; the lean stays until the next setting. Raises `OutOfRange`, `DeviceFault`.
         """
@@ -146,7 +146,7 @@ class SimTurntable:
         return DeviceIdentity("simulated", "three-axis table", self._description.id)
 
     async def read(self) -> TableReading:
-        """Read encoders and status; see the port."""
+        """Return encoder angles, rates, and whether it moves. Implements `Turntable.read`."""
         outer, middle, inner = self.read_rates_deg_s().tolist()
         return TableReading(
             self._clock.now_s(), self.read_angles(), not self.locked, rates_deg_s=(outer, middle, inner)

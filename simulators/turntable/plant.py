@@ -151,7 +151,7 @@ class Plant:
         self._state = np.concatenate([[0.0], angles_rad, np.zeros(3), held])
 
     def shift(self, angles_rad: Array) -> None:
-        """Call the axes' angles by other names, the motion continuing: whole turns alone change nothing."""
+        """Add whole turns to the axes' angles; the motion continues unchanged."""
         self._state[1:4] += angles_rad
 
     def run(self, profile: Profile, first_step: int, steps: int) -> Array:
