@@ -33,7 +33,7 @@ class Identity:
     credential: str = ""
     """Digest of the session, id of the token or name of the account behind it."""
     csrf: str | None = None
-    """Value that a request which changes something must repeat; None: its credential is sent by no browser itself."""
+    """Value that a request which changes something must repeat; None: no browser sends its credential by itself."""
     proven: bool = True
     """False where there are no accounts: then the name that a client gives itself counts."""
 

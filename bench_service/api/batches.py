@@ -27,7 +27,7 @@ router = Routes(prefix="/api/v1/analyses/batches", tags=["analyses"])
 LOOK_S = 0.5
 """Interval at which a stream of a batch looks for progress [s]."""
 QUIET_LOOKS = 20
-"""Looks without a change after which a comment says that the connection lives."""
+"""Number of looks without a change after which a comment is sent, to show that the connection is alive."""
 
 
 class RecordingSelection(Request):

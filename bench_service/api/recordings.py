@@ -81,7 +81,7 @@ class RecordingPage(BaseModel):
 
 
 EXPORTS = Places("exports", most=8, most_bytes=100_000_000)
-"""Exports at a time: each holds a chunk of samples and its form in the file."""
+"""Places for the exports under way: each holds a chunk of samples and its form in the file."""
 BYTES = {"type": "string", "format": "binary"}
 TYPES = [form.media_type.split(";")[0] for form in (ExportFormat.NPY, *ExportFormat)]
 """Media types of exports. Bytes come first: generators take the first type that they know, and CSV would be text."""

@@ -31,7 +31,7 @@ from procedures.core.errors import BadParameter
 router = Routes(prefix="/api/v1", tags=["recordings"])
 
 HELD = {SheetFormat.MATLAB: 32}
-"""Times a chunk's raw bytes that an export holds; a .mat file is held as a whole."""
+"""Memory that an export holds, by format, in raw bytes of a chunk; a .mat file is held as a whole."""
 BYTES: dict[str, object] = {"schema": {"type": "string", "format": "binary"}}
 DATA: dict[int | str, dict[str, object]] = {
     200: {"description": "A file in the format that was asked for", "content": {"application/octet-stream": BYTES}}

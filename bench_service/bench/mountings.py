@@ -15,9 +15,9 @@ from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
 EARLIEST = datetime(1970, 1, 1, tzinfo=UTC)
-"""No mounting is older."""
+"""Earliest moment of a mounting that is accepted."""
 AHEAD = timedelta(minutes=1)
-"""How far the client's clock may be ahead."""
+"""Time by which a client's clock may be ahead of this one."""
 
 
 class MountingStore(Protocol):

@@ -88,4 +88,4 @@ class AskedOperator:
 
 
 Asking = Callable[[str, Operator | None], Operator]
-"""Makes, from a job's id and the bench's own operator, the operator that the procedure asks."""
+"""Function that returns the operator that a procedure asks, from a job's id and the bench's own operator."""

@@ -35,7 +35,8 @@ STOP_LOOK_S = 0.5
 ANSWER_S = 0.1
 """Time that a look waits for the database's answer [s]; a later answer is seen by a later look."""
 LEASE_S = 0.8
-"""Time that it waits for the lease of a dead worker [s]: after it the devices' own link, exclusive too, must do."""
+"""Time that the supervisor waits for the lease of a dead worker [s]; after it, the devices' own link, which is
+exclusive too, has to suffice."""
 AGAIN_S = 1.0
 """Interval between two attempts to make devices safe that could not be made safe [s]."""
 LEFT_S = 5.0
@@ -43,7 +44,7 @@ LEFT_S = 5.0
 not reach them, nor the database to stop the bench.
 """
 LINGER_S = 60.0
-"""Time that it stays after a crash, once the bench is safe [s]."""
+"""Time that the supervisor stays after a crash of the worker, once the bench is safe [s]."""
 
 log = logging.getLogger(__name__)
 

@@ -42,7 +42,7 @@ IDLE_S = 1.0
 LEAVE_S = 10.0
 """Time that the end of the service waits for the look that is under way [s]."""
 METHODS_LEAVE_S = 1.0
-"""Time that it waits for methods that are being computed [s]: the next start begins them again."""
+"""Time that the end of the service waits for methods under way [s]; the next start begins them again."""
 HOPELESS = ("BadParameter", "Undetermined", "MissingChannel", "NotMounted")
 """Refusals that would recur: no retry helps."""
 

@@ -35,7 +35,7 @@ class StepPlan:
     name: str
     does: str
     left_out: str = ""
-    """The reason why it will not be done."""
+    """The reason why the step will not be done; empty: it will."""
     stations: int = 0
     duration_s: float = 0.0
     data_bytes: int = 0

@@ -19,7 +19,8 @@ LOOK_BACK = timedelta(days=2)
 """Time back over which the latest missed start is searched first: of many missed starts the latest counts."""
 
 AHEAD = timedelta(hours=1)
-"""A clock that was set back by more than this was wrong before; by less, it was put right a little."""
+"""Longest step back of the clock that counts as a correction: starts already made are not repeated. After a longer one
+the earlier time counts as wrong."""
 
 
 class Missed(StrEnum):

@@ -25,8 +25,9 @@ class FaultRule(BaseModel):
     verb: str = Field(min_length=1)
     """Verb as in the devices' journal, with wildcards: "turntable.move_to", "supply.*", "imu.block" (each block)."""
     kind: Literal["hang", "disconnect", "fault", "lost"]
-    """No answer at all (the thread that asked is lost, as in a vendor's library), a link that a new one replaces, a
-    fault of the device, or a link that is lost: a new one does not come about before the cable is plugged in again."""
+    """hang: no answer at all (the thread that asked is lost, as in a vendor's library); disconnect: a lost link, which
+    a new one replaces; fault: a fault of the device; lost: a lost link that cannot be made anew until the cable is
+    plugged in again."""
     probability: float = Field(gt=0.0, le=1.0)
     """Probability of the fault at each begin of the verb."""
     lasts_s: float | None = Field(None, gt=0.0)

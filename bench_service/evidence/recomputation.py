@@ -66,7 +66,7 @@ class Recomputation:
     """First places of the document that differ, as JSON pointers."""
     stored_version: str
     version: str
-    """Version of the procedure or method, then and now."""
+    """Version of the procedure or method that computed it again."""
     stored_code: str
     code: str
 

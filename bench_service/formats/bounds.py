@@ -22,11 +22,11 @@ class Bounds:
     """Most that an import may take; grows with the size of the files beyond 100 MB."""
 
     cells: int = 100_000_000
-    """Numbers that are read: six channels at 400 Hz for 11 h."""
+    """Largest number of cells that are read: six channels at 400 Hz for 11 h."""
     unpacked_bytes: int = 4_000 * MEGABYTE
-    """Text after unpacking, or columns of a columnar file."""
+    """Largest size of a text after unpacking, or of the columns of a columnar file [bytes]."""
     memory_bytes: int = 250 * MEGABYTE
-    """Memory of the process that reads, above what it takes idle."""
+    """Memory of the process that reads, above what it takes idle [bytes]."""
     time_s: float = 25.0
     """Time for which the reading process may be waited for [s]."""
 

@@ -40,7 +40,8 @@ class ExportFormat(StrEnum):
 
 
 HELD = {ExportFormat.ARROW: 4, ExportFormat.PARQUET: 5, ExportFormat.CSV: 8, ExportFormat.NPY: 4}
-"""Times a chunk's raw bytes that an export of it holds: as read, as columns, and as text or as a page of the file."""
+"""Memory that an export holds, by format, in raw bytes of a chunk: as read, as columns, and as text or as a page of the
+file."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class Findings:
 
     rate_hz: float
     count: int
-    """Rows of the recording, those that are put in for gaps counted, those that are left out not."""
+    """Number of rows of the recording, with those inserted for gaps, without those left out."""
     dtype: type[np.int32] | type[np.float64]
     """Integers where all values are integers."""
     clock: ClockFindings | None

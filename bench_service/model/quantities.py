@@ -17,7 +17,7 @@ class Quantity:
     unit: str
     standard_uncertainty: float | None = None
     bound: bool = False
-    """True: nothing was observed, and the value is what it stays below."""
+    """True where nothing was observed, and the value is an upper limit."""
 
 
 def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:

@@ -63,7 +63,7 @@ class StoredRecording:
     raw: RawState = RawState.STORED
     """Place of its raw samples."""
     raw_changed_at: datetime | None = None
-    """Time at which they came there; None: they were never moved."""
+    """Time at which its raw samples came to that place; None: they were never moved."""
     archive: str | None = None
     """Address of the archive that has, or had, its raw samples."""
     source: dict[str, Any] = field(default_factory=dict[str, Any])
@@ -101,7 +101,7 @@ class BenchStop:
     safe_at: datetime | None = None
     """Time when a process on the bench's host last saw the devices safe; None: not confirmed since the stop."""
     safe_by: str = ""
-    """Process that had last commanded them then."""
+    """Process that had last commanded the devices at that time."""
     by: str = ""
     """Person who stopped the bench, if known, or the process that could not make it safe."""
     id: str = field(default_factory=new_id)

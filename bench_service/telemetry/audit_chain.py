@@ -86,7 +86,7 @@ class ChainCheck:
     faults: list[str] = field(default_factory=list[str])
     checkpoints: tuple[Checkpoint, ...] = ()
     expected: str | None = None
-    """A digest that an earlier check gave: it must be met."""
+    """Digest that an earlier check gave, which must still be in the chain."""
     met: bool = False
 
     def pass_checkpoints(self, checkpoints: Iterable[Checkpoint]) -> None:

@@ -31,11 +31,11 @@ class UpkeepReport:
     kind: UpkeepKind
     began_at: datetime
     by: str
-    """The process that did it, as text."""
+    """The process that did the work, as text."""
     ended_at: datetime | None = None
-    """None: it is under way, or its process died."""
+    """Time of the end; None: the work is under way, or its process died."""
     good: bool | None = None
-    """None while it has not ended; false where something is wrong, which the document names."""
+    """True where nothing was wrong, False where something was, which the document names; None: it has not ended."""
     document: dict[str, Any] = field(default_factory=dict[str, Any])
 
 

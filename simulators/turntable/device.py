@@ -110,7 +110,7 @@ class SimTurntable:
         self._begin(Sine(self._plant.angles_rad, axis, amplitude, sinusoid.frequency_hz, sinusoid.cycles))
 
     def trace(self) -> EncoderTrace:
-        """Return the readings of a sinusoid since the last call, one a tick, timed exactly. Implements `Turntable.trace`."""
+        """Return a sinusoid's readings since the last call, one a tick, timed exactly. Implements `Turntable.trace`."""
         taken, self._traced = self._traced, NO_TRACE
         return taken
 

@@ -49,7 +49,7 @@ class Found:
     refusal: Refusal | None = None
     """The reason why there is no identity."""
     claims: bool = False
-    """True where nobody logs in, so that the name counts which a client gives itself."""
+    """True where the service has no accounts, so that the name counts that a client gives itself."""
 
     @property
     def proven_name(self) -> str | None:

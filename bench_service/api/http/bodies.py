@@ -16,7 +16,7 @@ from bench_service.formats.plain_json import faults
 BODY_BYTES = 1_000_000
 """Largest body of a route that takes no files; in an upload, the room for the description of the files."""
 SMALL_BYTES = 10_000
-"""A body of this length is looked through in a few milliseconds."""
+"""Length up to which a body is checked at once, in a few milliseconds, without a thread [bytes]."""
 TOLD = 20
 """Most faults of a body that an answer lists."""
 

@@ -28,7 +28,7 @@ LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")
 ANY_ADDRESS = ("0.0.0.0", "::", "")
 READING = ("GET", "HEAD")
 QUIET_S = 60.0
-"""Interval in which a reason to refuse is logged once [s]: a page that tries again and again fills no disk."""
+"""Interval in which a reason to refuse is logged once [s], so that a page that retries does not fill the disk."""
 _AUTHORITY = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(?::(?P<port>[0-9]{1,5}))?")
 _ORIGIN = re.compile(r"(?P<scheme>https?)://(?P<authority>[^/]+)")
 _DEFAULT_PORT = {"http": "80", "https": "443"}
@@ -94,7 +94,7 @@ class Refusal:
     kind: str
     text: str
     given: str
-    """The value that the request had instead: for the log."""
+    """Value that the request had instead of an allowed one, for the log."""
 
 
 class Doorkeeper:

@@ -54,7 +54,7 @@ async def _decider(client: ClientName, proven: ProvenName) -> Callable[[str | No
 
 
 DeciderOf = Annotated[Callable[[str | None, str], Decider], Depends(_decider)]
-"""Makes the decider of a name and a remark, as the body gives them."""
+"""Function that returns the decider, from the name and the remark that the body gives."""
 
 
 @router.post(

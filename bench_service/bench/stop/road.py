@@ -30,7 +30,7 @@ class Sent:
     taken: bool
     """True where the bench has it: in the stop channel's file, or in the hands of its worker or supervisor."""
     safety: Safety | None = None
-    """The bench's safety then, where the way itself reports it."""
+    """Safety of the bench after the stop; None: this route does not report it."""
 
 
 class StopRoad(Protocol):

@@ -19,13 +19,15 @@ class StopWord:
     reason: str
     by: str
     via: str
-    """"http", "page", "command", "listener", or "books": it was in the database before it was here."""
+    """"http", "page", "command", "listener", or "books" for a stop that was in the database before it was in the
+    channel."""
     id: str = field(default_factory=new_id)
     at: datetime = field(default_factory=now)
     booked: bool = False
-    """True once the database has it."""
+    """True once the database has this stop."""
     restored: bool = False
-    """True where a database that had it does not know it any more: it is entered again. Not kept in the channel."""
+    """True where a database that had this stop does not know it any more, as after a restored copy: it is entered
+    again. Not kept in the channel."""
 
     def __post_init__(self) -> None:
         """Escape the characters of its texts that no database and no answer can hold.

@@ -8,7 +8,7 @@ from bench_service.wall_clock import now
 
 FORMS = "HH:MM (the next one), 'YYYY-MM-DD HH:MM', or with a zone 2026-12-01T22:30+02:00"
 FARTHEST = timedelta(days=300)
-"""A start once is kept as a day and a month, which recur: one further ahead would come a year early."""
+"""Longest time ahead of a single start: it is stored as a day and a month, so a later one would come a year early."""
 
 
 def start_time(text: str, zone: str | None = None) -> datetime:

@@ -11,7 +11,7 @@ from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.units import DISPLAY
 
 CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction", "converter", "thermometers")
-"""Fields of a unit that name what is current of it."""
+"""Fields of a unit that name its current calibrations and corrections."""
 
 
 def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]] | None) -> tuple[Table, float]:

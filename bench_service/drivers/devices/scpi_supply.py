@@ -33,7 +33,7 @@ class ScpiSection(WireSupply):
     readback_v: Positive = 0.02
     """Largest difference of a setting read back from its demand [V]."""
     readback_a: Positive = 0.02
-    """The same of the current limit [A]."""
+    """Largest difference of a current limit read back from its demand [A]."""
 
 
 class ScpiSupply:

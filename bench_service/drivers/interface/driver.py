@@ -62,7 +62,8 @@ class Bound:
     """A limit that the device itself has: the path of the section's field, and the device's value."""
 
     field: str
-    """Such as "outer.rate_deg_s" or "limits.maximum_c"; a lower limit's name begins with "minimum"."""
+    """Limited quantity, such as "outer.rate_deg_s" or "limits.maximum_c"; a lower limit's name begins with
+    "minimum"."""
     value: float
 
     @property
@@ -105,7 +106,8 @@ class DeviceDriver(Generic[S]):
     section: type[S]
     """Its section: a subclass of the kind's base in `sections`, with the fields that this driver adds."""
     open: Callable[[S, DriverContext], Any]
-    """Makes the device: the kind's port of `procedures.bench` and `WireDevice`. Sends nothing."""
+    """Function that returns the device, which implements the kind's port of `procedures.bench` and `WireDevice`; it
+    sends nothing."""
 
 
 def narrowest(declared: float, own: float | None, lower: bool) -> float:

@@ -25,7 +25,7 @@ AGAIN_S = 0.5
 LISTEN_S = 0.01
 """Pause in which frames gather, so that they are decoded many at a time [s]."""
 MOST_AT_ONCE = 1 << 18
-"""Bytes after which they are decoded, whatever else has come."""
+"""Number of gathered bytes from which they are decoded without waiting for more."""
 Opening = Callable[[Transport], StreamDecoder]
 """Opens the conversation on a new line and returns a decoder. Raises `LineCut`, `BadAnswer`, `Refusal`."""
 
@@ -44,7 +44,7 @@ class Tape:
     held: int = 0
     failure: BenchError | None = None
     begun: bool = False
-    """True once it has got a frame: what was lost before that is not lost to it."""
+    """True once the recording has got a frame: frames lost before that do not count as lost."""
 
     def before(self, frames: int, now_s: float) -> int:
         """Number of the oldest of some frames, the newest of which came just now, that were sampled before the begin.

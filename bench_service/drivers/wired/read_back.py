@@ -14,9 +14,9 @@ from procedures.bench.supply import SupplyReading
 from procedures.bench.turntable import TableReading
 
 SET_POINT_C = 0.11
-"""Difference of two set points that is no difference: chambers have tenths of a degree [°C]."""
+"""Largest difference of two set points that count as equal, for chambers have tenths of a degree [°C]."""
 CURRENT_MA = 1e-3
-"""Difference of two current settings that is none [mA]."""
+"""Largest difference of two current settings that count as equal [mA]."""
 
 
 def unsafe_reading(kind: Kind, section: DeviceSection, reading: Any) -> str:

@@ -24,7 +24,7 @@ from bench_service.wall_clock import monotonic_s, now
 from procedures.core.errors import DomainError
 
 MOST_ATTEMPTS = 4
-"""Times that a task is claimed before a failure that may pass, or the end of its worker, is its end."""
+"""Number of claims after which a task has failed, where a transient failure or the end of its worker ended each."""
 RETRY_PAUSES_S = (2.0, 10.0, 60.0)
 """Pause before the second, third, fourth attempt after a failure that may pass [s]."""
 LOOK_S = 1.0

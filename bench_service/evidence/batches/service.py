@@ -14,9 +14,9 @@ from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
 MOST_RECORDINGS = 20_000
-"""Most recordings of one batch: more are several batches, by dates or units."""
+"""Largest number of recordings of one batch; for more, submit several batches, by dates or units."""
 MOST_WAITING = 100_000
-"""Most tasks of all batches that wait at one time; more are refused for now."""
+"""Largest number of tasks of all batches that wait at one time; further batches are refused for now."""
 
 
 class BatchService:

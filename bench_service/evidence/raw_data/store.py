@@ -104,7 +104,7 @@ class Archive(Protocol):
     """
 
     place: str
-    """Its address, as it is kept with each recording."""
+    """Address of the archive, as it is stored with each recording."""
 
     def copy(self, recording_id: str) -> None:
         """Copy the chunks of a recording from the database, and read each copy back against its hash.

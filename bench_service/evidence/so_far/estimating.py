@@ -34,7 +34,7 @@ from procedures.procedure import Context
 KEPT = 8
 """Number of recordings whose cells are kept."""
 MOST_STATIONS = 64
-"""Stations of a job beyond which its coefficients are not worked out after each of them."""
+"""Number of stations of a job above which its coefficients are not computed after each station."""
 _TABLE = ("orthogonality_sd_arcsec", "pointing_sd_arcsec", "level_sd_arcsec")
 _SITE = ("latitude_deg", "gravity_m_s2", "azimuth_deg", "azimuth_sd_arcsec")
 

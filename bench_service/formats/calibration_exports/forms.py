@@ -51,7 +51,7 @@ class _Form(NamedTuple):
 TEXT = "text/plain; charset=utf-8"
 YAML = "application/yaml"
 JSON = "application/vnd.bench.calibration+json"
-"""A kind of its own: it is a file of another program, and no answer of this API."""
+"""Media type of its own, because this is a file for another program and not an answer of the API."""
 _FORMS = {
     CalibrationForm.JSON: _Form(own_json, "json", JSON, True),
     CalibrationForm.C: _Form(c_source, "h", TEXT, True),

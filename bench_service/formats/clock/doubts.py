@@ -11,7 +11,7 @@ from procedures.core.recording import AROUND
 CRYSTAL = 1e-4
 """Largest relative error of an ordinary quartz's rate; beyond it a doubt is reported."""
 FASTEST_HZ, SLOWEST_HZ = 20_000.0, 1.0
-"""Beyond them a rate is unlikely for an inertial unit."""
+"""Highest and lowest sample rates that are likely for an inertial unit."""
 _NAMED_UNIT = re.compile(
     r"(?:^|[\s_\[(.])(ns|nsec|nanoseconds|us|µs|usec|microseconds|ms|msec|milliseconds)[\])]?$", re.IGNORECASE
 )

@@ -28,7 +28,7 @@ class ClockFindings:
     """Findings about a time column that was accepted: rate, repeated rows, gaps, lost samples, warnings."""
 
     rate_hz: float
-    """Samples over time, those that are lost counted in."""
+    """Samples over time, lost ones included."""
     repeats: NDArray[np.int64]
     """Rows, from 0 in what is read, that are to be left out."""
     gaps: NDArray[np.int64]

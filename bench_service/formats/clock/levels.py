@@ -18,7 +18,8 @@ EVEN = 0.1
 MOST_LOST = 1e12
 """Largest number of lost samples in one place: the number from a nonsensical stamp is clipped to it."""
 MADE_UP_FOR = 10_000
-"""More falls of the level than that are not compared with the rises before them: such a clock is of no use."""
+"""Number of falls of the level above which they are not compared with the rises before them: such a clock is
+useless."""
 
 
 @dataclass(frozen=True)

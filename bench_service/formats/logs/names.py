@@ -95,7 +95,7 @@ class Hint:
     unit: str | None = None
     """Unit that the name gives; None: none."""
     doubt: str = ""
-    """A sentence where the name says processed values."""
+    """Sentence on values that are processed, by their name; empty: none."""
 
 
 def unit_of(text: str, quantity: Quantity | Accumulated | None) -> str | None:

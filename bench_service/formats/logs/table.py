@@ -27,9 +27,9 @@ class LogColumn:
 
     name: str
     quantity: Quantity | Accumulated | None = None
-    """None: neither rate, force, increment nor temperature, or not known."""
+    """Quantity of the column; None: not known, or neither rate, force, increment nor temperature."""
     unit: str | None = None
-    """None: the file does not say."""
+    """Unit of the column; None: the file does not state it."""
     scale: float = 1.0
     offset: float = 0.0
     channel: str = ""
@@ -37,7 +37,7 @@ class LogColumn:
     source: str = ""
     """Origin of quantity, unit and scale, in words."""
     doubt: str = ""
-    """A sentence where the column may be something else, by its name."""
+    """Sentence on a column that may be something else, by its name; empty: none."""
 
 
 @dataclass(frozen=True)

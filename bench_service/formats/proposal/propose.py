@@ -22,9 +22,9 @@ from bench_service.formats.proposal.units_seen import suspicions, with_units
 SHOWN_COLUMNS = 64
 MOST_TABLES = 200
 RATE_TOLERANCE = 0.01
-"""Difference of a stated rate and that of the stamps that is not worth a word."""
+"""Largest relative difference of a stated rate and that of the stamps that is not reported."""
 NAMED_BY_PEOPLE = ("text", "phone", "xsens", "ros", "parquet", "arrow", "mat5", "hdf5", "tdms")
-"""Formats whose columns have any names."""
+"""Formats whose columns people may name as they like."""
 
 
 def propose(file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:

@@ -21,7 +21,7 @@ from procedures.core.errors import BadParameter
 MAGIC = b"\x89MCAP0\r\n"
 TOPIC, PROFILE, LIBRARY = "/imu", "ros2", "bench"
 BEGAN = "began_utc"
-"""Fact of a sheet from which stamps count, where the moment is known."""
+"""Fact of a sheet that names the moment from which stamps count, where it is known."""
 ROWS = 8192
 """Messages of a chunk: 3 MB before compression."""
 HEADER, FOOTER, SCHEMA, CHANNEL, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 1, 2, 3, 4, 6, 7, 8

@@ -63,7 +63,7 @@ class RecordingRow(Table):
     station_index: Mapped[int | None]
     station: Mapped[dict[str, Any] | None] = mapped_column(Document)
     station_label: Mapped[str | None]
-    """Of the station, to be searched."""
+    """Label of the station, for searches."""
     channels: Mapped[list[Any]]
     rate_hz: Mapped[float] = mapped_column(Float(53))
     start_s: Mapped[float] = mapped_column(Float(53))
