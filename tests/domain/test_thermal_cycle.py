@@ -148,9 +148,9 @@ def test_what_is_missing_is_said(runs: list[MemoryRecording], known: Context):
     warnings = " ".join(thermal_cycle.predict(PARAMS, bare).warnings)
     assert "converter" in warnings
     assert "calibration" in warnings
-    with pytest.raises(BadParameter, match="no thermal correction"):
+    with pytest.raises(BadParameter, match="no current thermal correction"):
         thermal_cycle.predict(PARAMS.model_copy(update={"correction": "current"}), bare)
-    with pytest.raises(BadParameter, match="no thermal correction"):
+    with pytest.raises(BadParameter, match="no current thermal correction"):
         thermal_cycle.analyse(runs, PARAMS.model_copy(update={"correction": "current"}), bare)
 
 

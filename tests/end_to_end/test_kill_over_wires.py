@@ -6,6 +6,7 @@ are kept, and each further one is moved to afresh.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.wall_clock import monotonic_s
+from simulators.turntable.device import SimTurntable
 from tests.chaos.journals import NOTICE_LIMIT_S, NOTICED
 from tests.conformance.served import Served, served
 from tests.end_to_end.bench_process import BenchProcess
@@ -67,7 +69,8 @@ def test_killed_in_a_move_it_is_safe_by_its_own_readings_and_a_turned_table_is_n
     def turn_by_hand(served: object) -> None:
         table = behind.bench.bench.turntable
         here = table.read_angles()
-        table.place(type(here)(here.outer_deg, here.middle_deg + 5.0, here.inner_deg), (0.0, 0.0, 0.0))  # pyright: ignore[reportArgumentType]
+        turned = replace(here, middle_deg=here.middle_deg + 5.0)
+        SimTurntable.place(table, turned, np.zeros(3))  # the axes turn; a served person sets the unit alone
 
     link = bench.register.open("a test: where the table came to rest")
     link.note("a test", {}, angles_deg=(0.0, _world(behind)[2], 0.0))

@@ -161,15 +161,15 @@ def test_analyses_and_plots_are_made_in_other_processes_which_end_with_a_killed_
     body = {"method": "noise_analysis", "recordings": [recording_of(bench.client)], "parameters": {}}
     answer = bench.client.post("/api/v1/analyses", json=body, timeout=100)  # a process has to be begun for it
     assert answer.status_code == 201, answer.text
-    children = psutil.Process(bench.process.pid).children(recursive=True)
-    workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
-    assert len(workers) >= 2, [child.cmdline() for child in children]
     page = bench.client.get(f"/results/{answer.json()['id']}").text
     image = re.search(r'"(/results/[^"]+\.svg\?[^"]+)"', page)
     assert image is not None
     drawn = bench.client.get(html.unescape(image[1]))
     assert drawn.status_code == 200
     assert drawn.text.startswith("<svg")
+    children = psutil.Process(bench.process.pid).children(recursive=True)
+    workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+    assert len(workers) >= 2, [child.cmdline() for child in children]
     assert "is drawn in this process" not in bench.log.read_text()
     refused = bench.client.post("/api/v1/analyses", json={**body, "recordings": ["no such recording"]})
     assert (refused.status_code, refused.json()["type"]) == (404, "/problems/NotFound")

@@ -83,6 +83,8 @@ def plain(client: Client, method: str, path: str, encoding: str = "identity") ->
 
 def test_head_has_the_header_of_get_and_no_body(sqlite_client: Client, jobs: list[dict]) -> None:
     recording = ids(sqlite_client, "recordings", job=jobs[0]["id"])[0]
+    for noun in ("procedures", "methods"):  # pages show their titles once they have been read
+        assert sqlite_client.http.get(f"/api/v1/{noun}").is_success
     for path in ("/api/v1/jobs", f"/jobs/{jobs[0]['id']}", "/healthz", f"/api/v1/recordings/{recording}/data", "/docs"):
         head, get = (plain(sqlite_client, method, path) for method in ("HEAD", "GET"))
         assert head.status_code == get.status_code == 200, path
