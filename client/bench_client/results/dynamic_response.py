@@ -43,12 +43,13 @@ class ChannelResponse(Part):
     delay_standard_uncertainty_s: float
     """Standard uncertainty of the delay [s]"""
     delay_from_noise_s: float
-    """Part of it by noise, and by stamps that scatter from recording to recording [s]"""
+    """Part of that uncertainty by noise, and by stamps that scatter from recording to recording [s]"""
     delay_from_encoder_s: float
-    """Part of it by the time of the encoder's readings [s]"""
+    """Part of that uncertainty by the time of the encoder's readings [s]"""
     delay_from_clock_s: float
-    """Part of it by the unit's clock, where that differs from the bench's: the delay is another at each moment of
-    a recording, from its begin to its end by ``drift·T``, and counts as a rectangle's ``drift·T/√12`` [s]
+    """Part of that uncertainty by the unit's clock, where that differs from the bench's: the delay is another at
+    each moment of a recording, from its begin to its end by ``drift·T``, and counts as a rectangle's
+    ``drift·T/√12`` [s]
     """
     delay_degrees_of_freedom: int | None
     """Degrees of freedom of the uncertainty where the stamps' scatter was estimated; None: so many that none

@@ -327,7 +327,7 @@ class Normalised(Part):
     relative: bool
     """Whether the values are relative to that at the reference"""
     reference_c: float
-    """Temperature at which the correction does nothing [°C]"""
+    """Reference temperature t_0, at which F has its reference value [°C]"""
     at_reference: float
     """Value at the reference value_0, in the unit of the values."""
     coefficients: tuple[float, ...]
@@ -415,9 +415,9 @@ class Density(Part):
     density: tuple[float, ...]
     """Power spectral density at each frequency, one-sided"""
     lower: tuple[float, ...]
-    """Lower end of the interval"""
+    """Lower end of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
     upper: tuple[float, ...]
-    """Ends of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
+    """Upper end of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
 
 
 class AxisCorrection(Part):
@@ -471,7 +471,7 @@ class ThermometerCorrection(Part):
     sensors: tuple[SensorCorrection, ...]
     """Thermometers, one entry each"""
     reference_c: float
-    """Temperature at which the correction does nothing [°C]"""
+    """Reading at which the error is the offset alone [°C]"""
     covariance: tuple[tuple[float, ...], ...]
     """Covariance of offset and slope of the first sensor, of the second, …, (2m, 2m)."""
     fitted_range_c: tuple[float, ...]

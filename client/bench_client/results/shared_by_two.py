@@ -188,9 +188,9 @@ class Reading(Part):
     standard_uncertainty: float | None = None
     """Standard uncertainty, in the unit of the value"""
     lower: float | None = None
-    """Lower end of the interval"""
+    """Lower end of the interval at the requested confidence."""
     upper: float | None = None
-    """Ends of the interval at the requested confidence."""
+    """Upper end of the interval at the requested confidence."""
     upper_limit: float | None = None
     """The coefficient is below this with a probability of 95 % (one-sided), observed or not."""
     p_value: float | None = None

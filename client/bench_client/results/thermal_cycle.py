@@ -151,9 +151,9 @@ class FormFound(Part):
     worst_3_sigma_m_s2: tuple[float, ...]
     """Worst 3σ over the soaks, axis by axis [m/s²]"""
     magnitude_static_m_s2: float
-    """Root mean square of the magnitude about its mean, static regime [m/s²]"""
+    """Rms of |ĝ| about each run's mean, over the runs, in the static regime [m/s²]"""
     magnitude_dynamic_m_s2: float
-    """Rms of |ĝ| about each run's mean, over the runs [m/s²]"""
+    """Rms of |ĝ| about each run's mean, over the runs, in the dynamic regime [m/s²]"""
 
 
 class CorrelationFound(Part):
@@ -194,9 +194,9 @@ class GyroTemperature(Part):
     p_value: float
     """Joint p-value of the runs by Fisher's method."""
     slope_rad_s_c: float
-    """Slope against temperature, a degree Celsius [rad/s/°C]"""
+    """Weighted slope over the runs [rad/s/°C]"""
     slope_sd_rad_s_c: float
-    """Weighted slope over the runs with its standard uncertainty [rad/s/°C]"""
+    """Standard uncertainty of that slope [rad/s/°C]"""
 
 
 class GyroNoise(Part):
@@ -234,9 +234,9 @@ class AllanFound(Part):
     after: tuple[float, ...]
     """Deviation at each averaging time, after correction"""
     lower: tuple[float, ...]
-    """Lower end of the interval"""
+    """Lower end of the confidence interval of `after`."""
     upper: tuple[float, ...]
-    """Confidence interval of `after`."""
+    """Upper end of the confidence interval of `after`."""
     rise: float
     """Largest ratio of a lower end to the upper end at any shorter time: above one the deviation surely rises."""
 

@@ -19,8 +19,9 @@ class Density:
     frequency_hz: tuple[float, ...]
     density: tuple[float, ...]
     lower: tuple[float, ...]
+    """Lower end of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
     upper: tuple[float, ...]
-    """Ends of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
+    """Upper end of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
 
 
 def density_of(slow: Powers, fast: Powers | None, confidence: float) -> Density:

@@ -54,11 +54,11 @@ class ChannelResponse:
     """Delay of the samples against their stamps, of slow motion: pure delay and lag together [s]."""
     delay_standard_uncertainty_s: float
     delay_from_noise_s: float
-    """Part of it by noise, and by stamps that scatter from recording to recording."""
+    """Part of that uncertainty by noise, and by stamps that scatter from recording to recording."""
     delay_from_encoder_s: float
-    """Part of it by the time of the encoder's readings."""
+    """Part of that uncertainty by the time of the encoder's readings."""
     delay_from_clock_s: float
-    """Part of it by the unit's clock, where that differs from the bench's: the delay is another at each moment of a
+    """Part of that uncertainty by the unit's clock, where that differs from the bench's: the delay is another at each moment of a
     recording, from its begin to its end by ``drift·T``, and counts as a rectangle's ``drift·T/√12``."""
     delay_degrees_of_freedom: int | None
     """Degrees of freedom of the uncertainty where the stamps' scatter was estimated; None: so many that none counts."""

@@ -111,8 +111,9 @@ class FormFound:
     worst_3_sigma_m_s2: Triple
     """Worst 3σ over the soaks, axis by axis."""
     magnitude_static_m_s2: float
+    """Rms of |ĝ| about each run's mean, over the runs, in the static regime."""
     magnitude_dynamic_m_s2: float
-    """Rms of |ĝ| about each run's mean, over the runs."""
+    """Rms of |ĝ| about each run's mean, over the runs, in the dynamic regime."""
 
 
 @dataclass(frozen=True)
@@ -146,8 +147,9 @@ class GyroTemperature:
     p_value: float
     """Joint p-value of the runs by Fisher's method."""
     slope_rad_s_c: float
+    """Weighted slope over the runs."""
     slope_sd_rad_s_c: float
-    """Weighted slope over the runs with its standard uncertainty."""
+    """Standard uncertainty of that slope."""
 
 
 @dataclass(frozen=True)
@@ -174,8 +176,9 @@ class AllanFound:
     before: tuple[float, ...]
     after: tuple[float, ...]
     lower: tuple[float, ...]
+    """Lower end of the confidence interval of `after`."""
     upper: tuple[float, ...]
-    """Confidence interval of `after`."""
+    """Upper end of the confidence interval of `after`."""
     rise: float
     """Largest ratio of a lower end to the upper end at any shorter time: above one the deviation surely rises."""
 
