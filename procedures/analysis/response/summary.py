@@ -58,8 +58,8 @@ class ChannelResponse:
     delay_from_encoder_s: float
     """Part of that uncertainty by the time of the encoder's readings."""
     delay_from_clock_s: float
-    """Part of that uncertainty by the unit's clock, where that differs from the bench's: the delay is another at each moment of a
-    recording, from its begin to its end by ``drift·T``, and counts as a rectangle's ``drift·T/√12``."""
+    """Part of that uncertainty by the unit's clock, where that differs from the bench's: the delay is another at each
+    moment of a recording, from its begin to its end by ``drift·T``, and counts as a rectangle's ``drift·T/√12``."""
     delay_degrees_of_freedom: int | None
     """Degrees of freedom of the uncertainty where the stamps' scatter was estimated; None: so many that none counts."""
     time_constant_s: float | None
