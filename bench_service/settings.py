@@ -41,7 +41,7 @@ class Settings(BaseModel):
     database_url: str = DATABASE_URL
     """`sqlite:///file` (embedded, one machine) or `postgresql+psycopg://…`."""
     host: str = "127.0.0.1"
-    """An address other than a loopback one needs `token_file` or `published`."""
+    """An address other than a loopback one needs an account, a token (stored, or `token_file`) or `published`."""
     hosts: Annotated[tuple[HostName, ...], BeforeValidator(_listed)] = ()
     """Names that requests may use, besides the loopback ones, comma-separated: those of a proxy, of a container.
 

@@ -85,8 +85,10 @@ class Gate(Document):
 class DecisionRule(Document):
     """Rule of the campaign's decisions on its own limits (ISO/IEC 17025, 7.8.6; ILAC-G8).
 
-    ``U = k·u`` is the expanded uncertainty; a value is accepted at ``limit − r·U`` for a maximum, ``limit + r·U`` for a
-    minimum. Simple acceptance is r = 0. A value without a known uncertainty is accepted simply, and that is said.
+    ``U = k·u`` is the expanded uncertainty, k the `coverage_factor`. Under `rule` "guarded" a value is accepted at
+    ``limit − r·U`` for a maximum, ``limit + r·U`` for a minimum; r is `guard`. Under "simple", the default, it is
+    accepted at the limit and `guard` has no effect. A value without a known uncertainty is accepted simply, and the
+    check's note says so.
     """
 
     rule: Literal["simple", "guarded"] = "simple"

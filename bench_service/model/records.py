@@ -20,7 +20,9 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Page(Generic[T]):
-    """A page of a list, newest first; `next` is the cursor of the following page or None."""
+    """A page of a list, newest first unless its method says otherwise; `next` is the cursor of the following page, None
+    on the last one.
+    """
 
     items: tuple[T, ...]
     next: str | None = None

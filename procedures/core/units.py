@@ -1,4 +1,4 @@
-"""Conversion factors, written nowhere else. Multiply by one to reach SI, divide by it to leave SI."""
+"""Conversion factors; scripts of pages repeat those that they show. Multiply by one to reach SI, divide to leave it."""
 
 from math import pi, sqrt
 

@@ -95,10 +95,9 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Return the calibration from one recording a position. Raises `Undetermined` where the positions are not
-    sufficient.
+    """Return the calibration from one recording a position. Raises `Undetermined` where they do not determine it.
 
-    Also `UnfitRecording` and `BadParameter` where positions are missing or too few.
+    Also `UnfitRecording` for fewer than two recordings or an unfit one, and `BadParameter` where positions are missing.
     """
     require_accelerometers(evidence.recordings)
     positions = _positions(evidence.recordings, params)

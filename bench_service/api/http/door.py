@@ -135,7 +135,10 @@ class Doorkeeper:
 
 
 def may_listen(settings: Settings) -> bool:
-    """Return whether a service may listen at its address: a loopback one, or one whose peers authenticate."""
+    """Return whether the settings alone let a service listen: at a loopback address, with a token file or `published`.
+
+    False is no refusal yet: accounts and tokens in the database let it listen too, which the caller looks for.
+    """
     return is_loopback(settings.host) or settings.token_file is not None or settings.published is not None
 
 

@@ -3,7 +3,11 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, ThermometerCorrection, Verdict
+from bench_client.results.shared import Check
+from bench_client.results.shared_by_two import Reading
+from bench_client.results.shared import Statement
+from bench_client.results.shared import ThermometerCorrection
+from bench_client.results.shared import Verdict
 
 
 class SensorFit(Part):

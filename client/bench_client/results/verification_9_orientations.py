@@ -3,7 +3,11 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, DwellsSaved, Magnitudes, Statement, Verdict
+from bench_client.results.shared import Check
+from bench_client.results.shared import DwellsSaved
+from bench_client.results.shared import Magnitudes
+from bench_client.results.shared import Statement
+from bench_client.results.shared import Verdict
 
 
 class Change(Part):

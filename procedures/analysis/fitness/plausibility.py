@@ -43,7 +43,11 @@ class Doubt:
 
 
 class Readings:
-    """Running mean magnitudes of triads and single channels, over short bursts throughout the recording."""
+    """Gathers, piece by piece, the magnitude that each triad reads and the mean of each channel; `doubts` compares them
+    with gravity, the Earth's rate and possible temperatures.
+
+    Each piece gives the median of short bursts at its beginning, and the pieces are averaged.
+    """
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float) -> None:
         self._rate_hz = rate_hz

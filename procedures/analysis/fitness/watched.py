@@ -122,7 +122,9 @@ class Watched:
 
     @property
     def has_outliers(self) -> bool:
-        """True if there are outliers to mend."""
+        """True if the first whole pass found outliers to mend. False before that pass, which this does not make, and
+        where the settings do not mend outliers.
+        """
         return bool(self._outliers)
 
     def mend(self) -> None:
