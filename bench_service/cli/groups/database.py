@@ -38,7 +38,8 @@ def database(context: typer.Context, server: Server = None, as_json: AsJson = Fa
 def scrub(context: typer.Context, as_json: AsJson = False) -> int:
     """Check the database's integrity and every stored chunk against its hash; also while a service uses it.
 
-    The outcome is stored, and `bench database` shows it. Exit code: 0 all as it was stored, 1 damage was found, 2 not checked.
+    The outcome is stored, and `bench database` shows it. Exit code: 0 all as it was stored, 1 damage was found, 2 not
+    checked.
     """
     from bench_service.bench.processes import ProcessIdentity
     from bench_service.evidence.upkeep import UpkeepService, sentence

@@ -21,6 +21,7 @@ from bench_client.results.multi_position_calibration import MultiPositionCalibra
 from bench_client.results.multi_position_calibration_of_recordings import MultiPositionCalibrationOfRecordingsResult
 from bench_client.results.no_operation import NoOperationResult
 from bench_client.results.noise_analysis import NoiseAnalysisResult
+from bench_client.results.part import OtherResult, ResultHead
 from bench_client.results.plan_orientations import PlanOrientationsResult
 from bench_client.results.polarity_check import PolarityCheckResult
 from bench_client.results.run_to_run import RunToRunResult
@@ -33,7 +34,6 @@ from bench_client.results.thermal_correction_of_recordings import ThermalCorrect
 from bench_client.results.thermal_cycle import ThermalCycleResult
 from bench_client.results.thermometer_calibration import ThermometerCalibrationResult
 from bench_client.results.verification_9_orientations import Verification9OrientationsResult
-from bench_client.results.part import OtherResult, ResultHead
 
 Result = (
     Calibration12OrientationsResult

@@ -3,12 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared_by_two import Averaging
-from bench_client.results.shared import BandCurve
-from bench_client.results.shared import Check
-from bench_client.results.shared import Density
-from bench_client.results.shared import Statement
-from bench_client.results.shared import Verdict
+from bench_client.results.shared import BandCurve, Check, Density, Statement, Verdict
 
 
 class LaunchCurvesCurve(Part):

@@ -3,12 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check
-from bench_client.results.shared import DwellsSaved
-from bench_client.results.shared import Statement
-from bench_client.results.shared import ThermalShare
-from bench_client.results.shared import TriadSummary
-from bench_client.results.shared import Verdict
+from bench_client.results.shared import Check, DwellsSaved, Statement, ThermalShare, TriadSummary, Verdict
 
 
 class Calibration12OrientationsDocument(Part):

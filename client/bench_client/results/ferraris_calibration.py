@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from bench_client.results.part import Part, ResultHead
+from bench_client.results.part import ResultHead
 from bench_client.results.shared_by_two import FerrarisCalibrationDocument
 
 

@@ -3,9 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check
-from bench_client.results.shared import Statement
-from bench_client.results.shared import Verdict
+from bench_client.results.shared import Check, Statement, Verdict
 
 
 class CrossCoupling(Part):

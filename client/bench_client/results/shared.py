@@ -3,8 +3,6 @@
 from typing import Literal
 
 from bench_client.results.part import Part
-from bench_client.results.shared_by_two import Averaging
-from bench_client.results.shared_by_two import Reading
 
 
 class Limit(Part):

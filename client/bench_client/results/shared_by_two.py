@@ -3,17 +3,19 @@
 from typing import Literal
 
 from bench_client.results.part import Part
-from bench_client.results.shared import BandCurve
-from bench_client.results.shared import Check
-from bench_client.results.shared import Density
-from bench_client.results.shared import DwellsSaved
-from bench_client.results.shared import Statement
-from bench_client.results.shared import ThermalShare
-from bench_client.results.shared import ThermometerCorrection
-from bench_client.results.shared import TriadCalibration
-from bench_client.results.shared import TriadSummary
-from bench_client.results.shared import Verdict
-from bench_client.results.shared import WholeTurns
+from bench_client.results.shared import (
+    BandCurve,
+    Check,
+    Density,
+    DwellsSaved,
+    Statement,
+    ThermalShare,
+    ThermometerCorrection,
+    TriadCalibration,
+    TriadSummary,
+    Verdict,
+    WholeTurns,
+)
 
 
 class FerrarisCalibrationDocument(Part):

@@ -3,11 +3,8 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared_by_two import ChannelSummary
-from bench_client.results.shared import Check
-from bench_client.results.shared_by_two import LaunchNoise
-from bench_client.results.shared import Statement
-from bench_client.results.shared import Verdict
+from bench_client.results.shared import Check, Statement, Verdict
+from bench_client.results.shared_by_two import ChannelSummary, LaunchNoise
 
 
 class StaticRunDocument(Part):

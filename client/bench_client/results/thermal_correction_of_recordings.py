@@ -3,10 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check
-from bench_client.results.shared import Statement
-from bench_client.results.shared import ThermalCorrection
-from bench_client.results.shared import Verdict
+from bench_client.results.shared import Check, Statement, ThermalCorrection, Verdict
 
 
 class AxisResult(Part):

@@ -3,13 +3,8 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared_by_two import Averaging
-from bench_client.results.shared import AxisCorrection
-from bench_client.results.shared import Check
+from bench_client.results.shared import AxisCorrection, Check, Statement, ThermalCorrection, Verdict
 from bench_client.results.shared_by_two import GyroThermalCorrection
-from bench_client.results.shared import Statement
-from bench_client.results.shared import ThermalCorrection
-from bench_client.results.shared import Verdict
 
 
 class LegEvidence(Part):

@@ -3,11 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check
-from bench_client.results.shared_by_two import Reading
-from bench_client.results.shared import Statement
-from bench_client.results.shared import ThermometerCorrection
-from bench_client.results.shared import Verdict
+from bench_client.results.shared import Check, Statement, ThermometerCorrection, Verdict
 
 
 class SensorFit(Part):
