@@ -1,6 +1,7 @@
 """MATLAB, HDF5 and TDMS files of scipy, h5py and npTDMS read to the motion that was written."""
 
 import io
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import scipy.io
 
 from bench_service.formats.errors import UnreadableFile
+from bench_service.formats.logs.arrays_by_name.hdf5 import opened
 from tests.formats.reading import FORCES, RATES, ROWS, proposed, read, require_motion
 
 TIME_S = np.arange(ROWS) * 0.005
@@ -85,6 +87,15 @@ def test_an_hdf5_file_with_units_as_attributes(chunks: tuple[int, int] | None) -
     assert proposal.format == "hdf5"
     assert proposal.unknown == []
     assert proposal.description["time_unit"] == "ns"
+
+
+def test_an_hdf5_file_without_a_name_is_read() -> None:
+    """An upload is spooled to a temporary file that has no name: HDF5 2.0 cannot resolve the link to it."""
+    with tempfile.TemporaryFile() as spooled:
+        with h5py.File(spooled, "w") as file:
+            file["imu/gyro"] = RATES
+        spooled.seek(0)
+        assert opened(spooled, "upload.h5").tables()[0].columns[0].name == "imu/gyro[0]"
 
 
 def test_a_mat_file_of_version_73_is_stored_transposed() -> None:

@@ -63,6 +63,22 @@ def test_xsens_increments_of_velocity_are_read_and_quaternions_are_not() -> None
     assert any("OriInc is a quaternion" in words for words in proposal.unknown)
 
 
+@pytest.mark.parametrize(
+    ("rate", "force"), [("gyro_{}_rad_per_s", "accelerometer_{}_m_per_s2"), ("gyr_{}_rads", "acc_{}_m_s2")]
+)
+def test_units_at_the_end_of_names_are_units_and_no_index_of_an_axis(rate: str, force: str) -> None:
+    """The first pair are the names of our own physical exports; the 2 of "s2" was taken for the third axis."""
+    head = ",".join(["time_s", *(rate.format(axis) for axis in "xyz"), *(force.format(axis) for axis in "xyz")])
+    proposal, _ = require_motion(
+        _text(head + "\n", lambda r: [f"{0.005 * r:.3f}", *_six(r)]).encode(), ROUNDED, "x.csv"
+    )
+    assert [(c.channel, c.unit) for c in proposal.columns] == [
+        *((f"gyro_{axis}", "rad/s") for axis in "xyz"),
+        *((f"accelerometer_{axis}", "m/s^2") for axis in "xyz"),
+    ]
+    assert proposal.unknown == []
+
+
 def test_columns_of_a_ros_message_have_their_units_and_the_senders_stamp() -> None:
     parts = [f"field.{kind}.{axis}" for kind in ("angular_velocity", "linear_acceleration") for axis in "xyz"]
     head = f"%time,field.header.seq,field.header.stamp,field.header.frame_id,{','.join(parts)}\n"

@@ -279,6 +279,7 @@ def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_pat
         checked = bench("certificate", "check", file, "--certificate", tmp_path / "lab.cert.pem")
         assert checked.code == 0, checked.err
         assert "valid, unchanged, signed by CN=Lab" in checked.out
+        assert ("the pages are not checked" in checked.out) == (file.suffix == ".pdf")
         assert "entered from passport 17: there are no raw data" in checked.out
     one_line(bench("certificate", "check", laboratory, "--certificate", tmp_path / "lab.cert.pem"), "not XML")
     (tmp_path / "no.pdf").write_bytes(b"%PDF-1.7\n")

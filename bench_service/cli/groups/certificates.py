@@ -210,7 +210,8 @@ def _repeated(
 
 def _say(file: Path, facts: dict[str, Any]) -> None:
     lines = [
-        f"{file}: valid, unchanged, signed by {facts['signed_by']}",
+        f"{file}: {'the XML inside is ' if file.suffix.lower() == '.pdf' else ''}valid, unchanged, signed by "
+        f"{facts['signed_by']}" + ("; the pages are not checked" if file.suffix.lower() == ".pdf" else ""),
         f"unit {facts['unit']}, calibrations {', '.join(facts['calibrations'])}",
         "schema: " + ("valid" if facts["schema_checked"] else "not checked, see --schema"),
         *(f"raw data of the {triad} triad: {sentence}" for triad, sentence in facts["recomputed"].items()),

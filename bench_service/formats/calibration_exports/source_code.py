@@ -58,7 +58,8 @@ MODEL = "v = A*(U - b), A the inverse of K; U is the nominal output scale*(raw -
 
 def c_source(subject: CalibrationSubject) -> str:
     """Return a C99 header with one function a triad: ``correct_gyro(u, v)`` and ``correct_accelerometer(u, v)``."""
-    guard = "CALIBRATION_" + re.sub(r"[^A-Z0-9]", "_", subject.unit.upper())
+    of_these = "_".join(t.id for t in subject.triads)  # a header of other calibrations must collide, not be left out
+    guard = "CALIBRATION_" + re.sub(r"[^A-Z0-9]", "_", f"{subject.unit}_{of_these}".upper())
     head = [f"/* {line.replace('*/', '* /')} */" for line in (*subject.remarks(), MODEL)]
     functions = [C_FUNCTION.format(**_numbers(t, "    {%s}", ",\n")) for t in subject.triads]
     return "\n".join([*head, f"#ifndef {guard}", f"#define {guard}"]) + "\n" + "".join(functions) + "\n#endif\n"

@@ -81,6 +81,10 @@ def parsed(data: bytes) -> Element:
         raise CertificateRefused(f"not XML: {error}") from error
     if root.getroottree().docinfo.doctype:
         raise CertificateRefused("the certificate has a DOCTYPE, which is not allowed")
+    if next(root.getroottree().iter(etree.Comment, etree.ProcessingInstruction), None) is not None:
+        raise CertificateRefused(
+            "the certificate has a comment or processing instruction, which signatures leave out and which cuts texts"
+        )
     return root
 
 

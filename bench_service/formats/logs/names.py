@@ -12,6 +12,8 @@ from bench_service.formats.input_units import allowed_units, spelled
 from procedures.core.recording import Quantity
 
 _UNIT_IN_NAME = re.compile(r"[\[(\]{]\s*([^\[\](){}]+?)\s*[\])}]\s*$")
+_UNIT_AT_END = re.compile(r"_(?:rad|deg|m)_?(?:per|p)_?(?:s|h)_?\^?2?$|_m_?s_?\^?2$")
+"""Units that end a name without brackets, as those of our own exports do; their 2 is no index."""
 _INDEX = re.compile(r"[\[(]?([0-2])[\])]?$")
 _RATE_WORDS = r"gyro|gyr|gyroscope|angular_?(?:rate|velocity|vel)|ang_?vel|omega|omg|w_rs_s|rotation_?rate|rot_?rate"
 _FORCE_WORDS = (
@@ -165,6 +167,7 @@ def _plain(name: str) -> str:
 
 
 def _axis(lower: str) -> str:
+    lower = _UNIT_AT_END.sub("", lower)
     bare = re.sub(r"[\[(][^\[\](){}]*[a-z/][^\[\](){}]*[\])]\s*$", "", lower).rstrip("_ ")
     index = _INDEX.search(bare)
     if index is not None and not re.search(r"[xyz]_?\d?$", bare):
@@ -177,5 +180,6 @@ def _named_unit(name: str, quantity: Quantity) -> str | None:
     match = _UNIT_IN_NAME.search(name)
     if match is not None:
         return unit_of(match[1], quantity)
-    tail = name.lower().replace("m_s2", "mps2").rsplit("_", 1)[-1]
+    tail = name.lower().replace("_per_", "p").replace("m_s2", "mps2").replace("radps", "rads").replace("degps", "dps")
+    tail = tail.rsplit("_", 1)[-1]
     return unit_of(tail, quantity) if tail in ("mps2", "dps", "rads", "degs", "degc", "mg") else None

@@ -179,12 +179,15 @@ def _part(place: _Place, item: Any, index: int, rows: slice, read: dict[str, Any
 
 
 def _by_descriptor(stream: BinaryIO) -> str | None:
-    """Return a path to the open file of a stream, which HDF5 reads faster than through Python; None: it has none."""
+    """Return a path to the open file of a stream, which HDF5 reads faster than through Python; None: it has none.
+
+    HDF5 2.0 resolves the link, which an unlinked temporary file, such as an upload's, does not survive.
+    """
     try:
         path = f"/proc/self/fd/{stream.fileno()}"
     except (OSError, ValueError, AttributeError):
         return None
-    return path if os.path.exists(path) else None
+    return path if os.path.exists(os.path.realpath(path)) else None
 
 
 def _text(value: Any) -> str:
