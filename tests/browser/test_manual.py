@@ -25,6 +25,8 @@ def test_an_operator_moves_the_table_by_hand(
     window.expected = AWAY  # a refusal is an answer of 422, which the browser writes down
     page = window.open("/")
     page.get_by_role("link", name="Manual mode").click()
+    page.wait_for_url("**/manual*")
+    page.wait_for_selector("html[data-ready]")  # a press before the page's script has come would reload the page
     page.get_by_label("Why").fill("a look at the table")
     page.get_by_role("button", name="Begin manual mode").press("Enter")
     lease = page.locator("#lease")
