@@ -228,6 +228,7 @@ def _column(column: LogColumn, place: int, values: Values) -> ProposedColumn:
         source=column.source,
         mean=column.scale * (mean - column.offset) if np.isfinite(mean) else None,
         deviation=abs(column.scale) * deviation if np.isfinite(deviation) else None,
+        unit_doubt=column.unit_doubt or None,
     )
 
 
