@@ -35,8 +35,7 @@ from bench_service.settings import Settings
 from procedures.core.imu_model import COEFFICIENT_NAMES, coefficient_unit
 from tests.kit.certificate_facts import TEXT
 from tests.kit.certificate_readers import SCHEMA, by_xmlsec, numbers_of
-
-TRIADS = {"gyro": "rad/s", "accelerometer": "m/s^2"}
+from tests.kit.exported_calibrations import UNITS
 
 
 def _entered(http: Any, unit: str, rng: np.random.Generator) -> list[str]:
@@ -48,7 +47,7 @@ def _entered(http: Any, unit: str, rng: np.random.Generator) -> list[str]:
         "/api/v1/recordings", files={"files": ("a.csv", b"gyro_x\n0.1\n0.2\n")}, data=form
     ).raise_for_status()
     ids: list[str] = []
-    for triad, si in TRIADS.items():
+    for triad, si in UNITS.items():
         k = np.diag(1.0 + rng.uniform(-0.02, 0.02, 3)) + rng.uniform(-0.01, 0.01, (3, 3))
         values = np.column_stack([rng.uniform(-0.1, 0.1, 3), k]).ravel()
         rows = [

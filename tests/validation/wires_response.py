@@ -63,7 +63,7 @@ def response(pace: float, stands: bool, seed: int, parameters: dict[str, Any]) -
         try:
             found = RESPONSE.analyse(recordings, params, context)
         except UnfitRecording as refusal:
-            return f"refused: {refusal}"
+            return f"{REFUSED}{refusal}"
     for warning in found.warnings:
         print(f"  warning: {warning}")
     return _told(found)
