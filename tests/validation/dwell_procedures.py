@@ -37,7 +37,7 @@ PROCEDURES = sorted(n for n, p in catalog.discover().items() if issubclass(p.par
 """Names of all procedures that take `stop_at`."""
 FIRST_SEED = 8_000_000
 WITHIN = 0.1
-"""Tolerance of the ratio of the two spreads, the issue's own."""
+"""Largest difference from 1 of the ratio of the two spreads that counts as none."""
 RESAMPLES = 4000
 EXACT = 1e-30 * np.eye(12)
 """Covariance of a calibration that is the truth."""
