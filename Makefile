@@ -18,7 +18,7 @@ help:  ## this list
 
 $(VENV)/.ready: requirements.lock pyproject.toml
 	@$(PYTHON) .preflight.py
-	@echo "installing the packages of requirements.lock into $(VENV): about two minutes the first time"
+	@echo "installing the packages of requirements.lock into $(VENV): some minutes where they are downloaded"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet --disable-pip-version-check uv
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --compile-bytecode --require-hashes -r requirements.lock

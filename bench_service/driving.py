@@ -94,4 +94,4 @@ def _stop_now(jobs: JobRunner, manual: ManualRunner, watch: Watch) -> None:
     manual.stop_now()
     jobs.stop_now()
     if watch.supervisor() is None:
-        jobs.try_again()
+        jobs.make_safe_again()

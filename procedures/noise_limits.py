@@ -12,18 +12,22 @@ from procedures.analysis.launch.prediction import predicted_noise
 from procedures.analysis.launch.results import ChannelNoise, LaunchNoise
 from procedures.analysis.launch.summary import ChannelSummary
 from procedures.core import units
-from procedures.core.limits import Check, Limit, PlannedCheck, check, significance
+from procedures.core.limits import Check, Limit, PlannedCheck, asked_limit, check, significance, upper_bound
 from procedures.core.recording import TRIADS
 from procedures.core.unit import Unit
 from procedures.parameters import Parameters
 
-SOURCE, ASKED = "thesis 4.3, 5.6", "the request"
+SOURCE = "thesis 4.3, 5.6"
 THESIS_LIMITS = {
     "gyro_random_walk_deg_sqrt_h": 0.003,
     "gyro_bias_in_run_deg_h": 0.015,
     "accelerometer_bias_in_run_m_s2": 0.0005,
 }
 """Requirements of the thesis on its own unit (4.3, 5.6), by the field of the limit."""
+
+
+def _where_declared(field: str, triad: str) -> str:
+    return f"null: {THESIS_LIMITS[field]:g} ({SOURCE}) where its {triad} are declared, else no check"
 
 
 class NoiseLimits(Parameters):
@@ -33,20 +37,19 @@ class NoiseLimits(Parameters):
         None,
         gt=0.0,
         le=1e6,
-        description="null: 0.003 (thesis 4.3, 5.6) where its gyros are declared, else no check",
+        description=_where_declared("gyro_random_walk_deg_sqrt_h", "gyros"),
     )
     gyro_bias_in_run_deg_h: float | None = Field(
         None,
         gt=0.0,
         le=1e6,
-        description="bias instability; null: 0.015 (thesis 4.3, 5.6) where its gyros are declared, else no check",
+        description=f"bias instability; {_where_declared('gyro_bias_in_run_deg_h', 'gyros')}",
     )
     accelerometer_bias_in_run_m_s2: float | None = Field(
         None,
         gt=0.0,
         le=100.0,
-        description="bias instability; null: 0.0005 (thesis 4.3, 5.6) where its accelerometers are declared, else "
-        "no check",
+        description=f"bias instability; {_where_declared('accelerometer_bias_in_run_m_s2', 'accelerometers')}",
     )
     readiness_s: float | None = Field(
         None,
@@ -121,7 +124,7 @@ def _limit(limits: NoiseLimits, field: str, unit: str, declared: bool) -> Limit 
     given: float | None = getattr(limits, field)
     if given is None:
         return Limit(unit, maximum=THESIS_LIMITS[field], source=SOURCE) if declared else None
-    return Limit(unit, maximum=given, source=SOURCE if given == THESIS_LIMITS[field] else ASKED)
+    return asked_limit(unit, given, THESIS_LIMITS[field], SOURCE)
 
 
 def noise_checks(limits: NoiseLimits, unit: Unit, duration_s: float, launches: int) -> list[PlannedCheck]:
@@ -160,7 +163,7 @@ def _check(s: ChannelSummary, process: str, limit: Limit, size: float) -> Check:
     bound = min((r.upper_limit for r in found.values if r.upper_limit is not None), default=float("inf"))
     described = all(reading.described for reading in found.values)
     reason = "not observed" if described else "not described by the noise model"
-    return check(name, bound / size, limit, note=f"{reason}: the value is what it stays below", bound=True)
+    return upper_bound(name, bound / size, limit, reason)
 
 
 def _absent(channel: str, process: str) -> str:

@@ -39,10 +39,6 @@ class StoredCorrection:
         choices = [d for d in self.decisions if d.act in (Act.CHOSEN, Act.GIVEN_BACK)]
         return self.current and (not choices or choices[-1].act is Act.GIVEN_BACK)
 
-    def gives_way(self, at: datetime) -> bool:
-        """Whether the rule may put another one in its place: a person's choice stands while it may be used."""
-        return self.by_rule or bool(self.unusable(at))
-
     @property
     def why_not_current(self) -> str:
         """Reason why it is not its kind's current one, with the way out; empty where it is."""

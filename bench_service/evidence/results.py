@@ -28,8 +28,8 @@ class ResultStore(Protocol):
         """Store a result with its lineage, calibrations and corrections, in one transaction.
 
         Calibrations, at most one of a triad, join the unit's history; where `by_rule` is true, those that
-        `model.calibrations.takes_over` allows become current. Corrections, at most one of a kind, become current there
-        where the result passed.
+        `model.calibrations.takes_over` allows become current. The same rule holds for corrections, at most one of a
+        kind.
         `content`: the digest of everything that the analysis read; with `reuse` a result of that content that is
         stored already is returned, and nothing is added.
         Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.

@@ -194,7 +194,7 @@ class JobRunner:
         with self._road:
             return whole_road(session, self._driver, self._by, given_back)
 
-    def try_again(self) -> None:
+    def make_safe_again(self) -> None:
         """Make devices safe over a new link that an earlier attempt has given up, once in `AGAIN_S`.
 
         For a stopped bench without a supervisor: nobody else tries before a person releases it.

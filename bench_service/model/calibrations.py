@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
+from typing import Protocol
 
 from bench_service.wall_clock import new_id
 from procedures.core.coefficient_name import CoefficientName
@@ -137,11 +138,21 @@ def coefficients_of(value: TriadCalibration) -> tuple[Coefficient, ...]:
     )
 
 
-def takes_over(verdict: Verdict, current: StoredCalibration | None, at: datetime) -> bool:
-    """Return whether a job's calibration becomes current: the job passed, and no usable choice of a person stands.
+class Current(Protocol):
+    """Calibration or correction that is current, as far as the rule asks about it."""
 
-    A choice of a person stands until the person gives the triad back to the rule, or the chosen one is rejected or
-    expires.
+    @property
+    def by_rule(self) -> bool: ...
+
+    def unusable(self, at: datetime) -> str: ...
+
+
+def takes_over(verdict: Verdict, current: Current | None, at: datetime) -> bool:
+    """Return whether a job's calibration or correction becomes current: the job passed, and no usable choice of a
+    person stands.
+
+    A choice of a person stands until the person gives the triad or kind back to the rule, or the chosen one is rejected
+    or expires.
     """
     if verdict is not Verdict.PASS:
         return False

@@ -71,6 +71,11 @@ class StoredRecording:
     source: dict[str, Any] = field(default_factory=dict[str, Any])
     """Origin of an imported recording: file name, its SHA-256, reader, declared reference values."""
 
+    @property
+    def file_name(self) -> str:
+        """Name of the first file of an imported recording; empty: it was recorded on a bench."""
+        return next((str(file.get("name", "")) for file in self.source.get("files") or ()), "")
+
 
 @dataclass(frozen=True)
 class NewRecording:

@@ -14,8 +14,8 @@ _elsewhere: list[WorkProcesses] = []
 """The processes that draw, where it is not this one."""
 
 
-def expect() -> None:
-    """Begin the process that draws: a person has opened a page, and will come to a figure."""
+def begin_drawing() -> None:
+    """Begin the process that draws, where there is one: a person has opened a page, and will come to a figure."""
     for processes in _elsewhere:
         processes.begin()
 

@@ -34,7 +34,7 @@ def service_of(request: Request) -> BenchService:
 
 def _shell(request: Request) -> dict[str, Any]:
     """Frame of every page around its content. It needs no database: the stop stands on pages of errors, too."""
-    figures.expect()
+    figures.begin_drawing()
     language = language_of(request)
     LANGUAGE.set(language)
     service = service_of(request)

@@ -58,17 +58,17 @@ def _reported(service: BenchService, result: StoredResult) -> dict[str, Any]:
     return {"result": result, "report": report, "sections": sections, "sources": _sources(service, result)}
 
 
-def _sources(service: BenchService, result: StoredResult) -> list[dict[str, str]]:
+def _sources(service: BenchService, result: StoredResult) -> list[dict[str, Any]]:
     """Recordings of an analysis by the numbers that its report gives them, with their names; none of a job's result."""
     if result.job_id is not None:
         return []
-    sources: list[dict[str, str]] = []
-    for recording_id, _ in result.recordings[:SHOWN_SOURCES]:
+    sources: list[dict[str, Any]] = []
+    for number, (recording_id, _) in enumerate(result.recordings[:SHOWN_SOURCES], start=1):
         with suppress(NotFound):  # removed since
             stored = service.stores.recordings.get(recording_id)
-            station, files = stored.info.station, stored.source.get("files") or ({},)
-            name = f"{station.index}: {station.label}" if station else files[0].get("name", "")
-            sources.append({"id": recording_id, "name": name})
+            station = stored.info.station
+            name = f"{station.index}: {station.label}" if station else stored.file_name
+            sources.append({"number": number, "id": recording_id, "name": name})
     return sources
 
 

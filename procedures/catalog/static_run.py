@@ -21,7 +21,7 @@ from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
 from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
-from procedures.noise_limits import NoiseLimits, noise_checks
+from procedures.noise_limits import THESIS_LIMITS, NoiseLimits, noise_checks
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -32,12 +32,14 @@ DWELL_STEP_S = 5.0
 class Limits(NoiseLimits):
     """Requirements of a launch on the bench: noise (thesis 4.3, 5.6), and readiness within ten minutes (table 1.4)."""
 
-    gyro_random_walk_deg_sqrt_h: float = Field(0.003, gt=0.0, le=1e6)  # pyright: ignore[reportIncompatibleVariableOverride]
+    gyro_random_walk_deg_sqrt_h: float = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        THESIS_LIMITS["gyro_random_walk_deg_sqrt_h"], gt=0.0, le=1e6
+    )
     gyro_bias_in_run_deg_h: float = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
-        0.015, gt=0.0, le=1e6, description="bias instability"
+        THESIS_LIMITS["gyro_bias_in_run_deg_h"], gt=0.0, le=1e6, description="bias instability"
     )
     accelerometer_bias_in_run_m_s2: float = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
-        0.0005, gt=0.0, le=100.0, description="bias instability"
+        THESIS_LIMITS["accelerometer_bias_in_run_m_s2"], gt=0.0, le=100.0, description="bias instability"
     )
     readiness_s: float | None = Field(
         600.0,

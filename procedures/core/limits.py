@@ -14,6 +14,8 @@ from typing import Literal
 
 RuleName = Literal["simple", "guarded"]
 OutcomeName = Literal["pass", "conditional pass", "conditional fail", "fail", "inconclusive"]
+ASKED = "the request"
+"""Source of a limit that a request gave."""
 BOUND_RULE = "an upper bound of what was not observed: it passes within the limit, and decides nothing outside"
 COVERAGE = 0.9545
 """Coverage probability without another wish: k = 2 of a normal distribution."""
@@ -207,6 +209,16 @@ def check(
         and (limit.minimum is None or value >= limit.minimum)
     )
     return Check(name, value, limit, passed, standard_uncertainty, note, degrees_of_freedom, bound=bound)
+
+
+def upper_bound(name: str, bound: float, limit: Limit, reason: str = "not observed") -> Check:
+    """Return the check of what was not observed, by the value that it stays below."""
+    return check(name, bound, limit, note=f"{reason}: the value is what it stays below", bound=True)
+
+
+def asked_limit(unit: str, maximum: float, default: float, source: str) -> Limit:
+    """Return a largest value with its source: that of the default, unless the request gave another value."""
+    return Limit(unit, maximum=maximum, source=source if maximum == default else ASKED)
 
 
 def significance(name: str, p_value: float, level: float, note: str = "", source: str = "") -> Check:

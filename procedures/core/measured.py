@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 from procedures.core.table_angles import TableAngles
 
+SCATTERS = 3.0
+"""Scatters of the samples' arrival that are no difference of pace."""
+
 
 @dataclass(frozen=True)
 class MeasuredAngles:
@@ -49,6 +52,18 @@ class MeasuredPace:
     less than the time that passed; negative: they came faster."""
     scatter_s: float
     """Scatter of the moments at which samples came [s]: what holds a block up, and no loss."""
+
+    def differs(self, share: float, length_s: float) -> bool:
+        """True if the samples parted from the clock by more than a share of the recording's length [s], and by more
+        than three scatters of their arrival.
+        """
+        return abs(self.behind_s) > max(share * length_s, SCATTERS * self.scatter_s)
+
+    @property
+    def said(self) -> str:
+        """Beginning of a sentence: the samples, and whether they fell behind the clock or were ahead of it."""
+        way = "fell behind" if self.behind_s > 0.0 else "were ahead of"
+        return f"the unit's samples {way} the bench's clock"
 
 
 @dataclass(frozen=True)

@@ -52,17 +52,21 @@ def load_calibration(file: str, triad: str | None = None) -> ExportedCalibration
             raise ValueError(f"format {document['format']!r}, version {document['version']!r}")
         parts = {part["triad"]: part for part in document["triads"]}
         found = {name: _triad(part) for name, part in parts.items()}
+        facts = {name: (str(part["calibration"]), str(part["validity"]["unusable"])) for name, part in parts.items()}
         unit = str(document["unit"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BadParameter("file", file, f"{allowed}; this one cannot be read: {error!r}") from error
+    except KeyError as error:
+        raise BadParameter("file", file, f"{allowed}; this one has no field {error}") from error
+    except (OSError, ValueError, TypeError) as error:
+        raise BadParameter("file", file, f"{allowed}; this one cannot be read: {error}") from error
+    if not found:
+        raise BadParameter("file", file, f"{allowed}; this one has no triad")
     names = ", ".join(found)
     if triad is None and len(found) != 1:
         raise BadParameter("triad", None, f"one of {names}: the file has both")
     name = triad or next(iter(found))
     if name not in found:
         raise BadParameter("triad", triad, f"what the file has: {names}")
-    part = parts[name]
-    made = ExportedCalibration(found[name], unit, str(part["calibration"]), str(part["validity"]["unusable"]), part)
+    made = ExportedCalibration(found[name], unit, *facts[name], parts[name])
     if made.unusable:
         warnings.warn(f"{made}", UserWarning, stacklevel=2)
     return made

@@ -8,13 +8,13 @@ from procedures.analysis.repeatability.run_to_run import Scatter, run_to_run
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, asked_limit, check, verdict
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, JudgedParameters, Method, Outcome, Planned
 
 TRIADS = ("gyro", "accelerometer")
-SOURCE, ASKED = "thesis 4.3, 5.6", "the request"
+SOURCE = "thesis 4.3, 5.6"
 FIELDS = {
     ("gyro", True): "gyro_bias_run_to_run_deg_h",
     ("gyro", False): "gyro_scale_run_to_run_ppm",
@@ -117,8 +117,7 @@ def _maximum(triad: str, bias: bool, params: Params) -> float | None:
 
 def _limit_of(triad: str, bias: bool, maximum: float, unit: str) -> Limit:
     """The limit with its source: another value than the thesis's comes from the request."""
-    default = Params.model_fields[FIELDS[triad, bias]].default
-    return Limit(unit, maximum=maximum, source=SOURCE if maximum == default else ASKED)
+    return asked_limit(unit, maximum, Params.model_fields[FIELDS[triad, bias]].default, SOURCE)
 
 
 def _si(s: Scatter, limit: Limit) -> float:

@@ -13,12 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from bench_service.drivers.composition import driver_of
-from bench_service.settings import Settings
 from procedures.bench import Bench, BenchNeeds
 from simulators.world import WorldConfig, build
 from tests.conformance.served import served
-from tests.kit.wired_bench import LANGUAGES, bench_file
+from tests.kit.wired_bench import LANGUAGES, wired_driver
 
 FACTOR = 10.0
 SEED = 77
@@ -36,9 +34,7 @@ async def _recorded(bench: Bench, before_s: float, record_s: float) -> tuple[lis
 
 def test_a_recording_over_wires_is_a_stretch_of_the_launch_in_process(tmp_path: Path) -> None:
     with served(LANGUAGES, factor=FACTOR, world=WorldConfig(seed=SEED)) as behind:
-        file = bench_file(tmp_path, behind, FACTOR)
-        settings = Settings(database_url=f"sqlite:///{tmp_path / 'b.sqlite'}", bench_file=file, bench_id="east")
-        wired = driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]
+        wired = wired_driver(tmp_path, behind, FACTOR)
         bench = wired.open("GL017", None, None, BenchNeeds())
         try:
             names, over_wires = asyncio.run(_recorded(bench, BEFORE_S, RECORD_S))

@@ -30,9 +30,9 @@ GREETINGS = {
     "ftp": b"220 ready\r\n",
     "codesys": b"100 OK: CoDeSys\r\n",
 }
-"""What servers say before they are asked."""
+"""Greetings of servers that speak before they are asked."""
 ANSWERS = {"http": b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n", "ideal aerosmith": b"?\r\n>"}
-"""What servers say to any line."""
+"""Answers of servers to any line."""
 DEMANDS = (b":demand:", b":mode:", b"OUTP", b"VOLT ", b"CURR ", b"11001", b"14001", b"$01E")
 
 

@@ -7,16 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench_service.drivers.composition import driver_of
 from bench_service.drivers.interface.address import Address
 from bench_service.drivers.wired.served_person import ServedPerson
-from bench_service.settings import Settings
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import DeviceFault, Disconnected
 from procedures.core.table_angles import TableAngles
 from simulators.served.person import angles_of
 from tests.conformance.served import Served, served
-from tests.kit.wired_bench import PERSON, THERMAL_LANGUAGES, bench_file
+from tests.kit.wired_bench import PERSON, THERMAL_LANGUAGES, wired_driver
 
 FACTOR = 200.0
 """The person takes some minutes of bench time."""
@@ -101,7 +99,5 @@ def _door(bench: object) -> bool:
 
 
 def _bench(behind: Served, folder: Path):
-    file = bench_file(folder, behind, behind.config.factor, after_demand_s=0.02)
-    settings = Settings(database_url=f"sqlite:///{folder / 'b.sqlite'}", bench_file=file, bench_id="east")
-    driver = driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]
+    driver = wired_driver(folder, behind, behind.config.factor, after_demand_s=0.02)
     return driver.open("GL017", None, None, BenchNeeds(temperatures=True))

@@ -14,6 +14,7 @@ from procedures.core import units
 from procedures.core.imu_model import triad_calibration
 from procedures.core.unit import Unit
 from procedures.procedure import Context
+from tests.kit.exported_calibrations import UNITS
 from tests.kit.forward_model import B_ACCELEROMETER, B_GYRO, K_ACCELEROMETER, K_GYRO
 
 CALIBRATION = catalog.discover()["calibration_12_orientations"]
@@ -92,7 +93,7 @@ def test_the_bias_in_run_of_a_calibration_is_foreseen_in_sample(context: Context
     squares = np.array([in_run(plan, dice) for _ in range(draws)]) ** 2
     assert planned.standard_uncertainty is not None
     assert planned.degrees_of_freedom is not None
-    foreseen = planned.standard_uncertainty * units.DISPLAY[{"gyro": "rad/s", "accelerometer": "m/s^2"}[triad]][1]
+    foreseen = planned.standard_uncertainty * units.DISPLAY[UNITS[triad]][1]
     assert abs(squares.mean() / foreseen**2 - 1.0) < 4.5 * np.sqrt(2.0 / (draws * planned.degrees_of_freedom))
 
 
@@ -102,7 +103,7 @@ def in_run(plan: TriadPlan, dice: np.random.Generator) -> float:
     assert noise is not None
     turned = plan.vectors + plan.table.sensitivity @ (plan.table.sd * dice.normal(size=len(plan.table.sd)))
     drawn = np.array([np.linalg.cholesky(c) @ dice.normal(size=len(turned)) for c in noise]).T
-    unit = {"gyro": "rad/s", "accelerometer": "m/s^2"}[plan.triad]
+    unit = UNITS[plan.triad]
     fit = fit_triad(plan.triad, unit, unit, plan.vectors, turned + drawn, noise, plan.table)
     reference = float(np.linalg.norm(plan.vectors[0]))
     return magnitudes(turned + drawn, fit.calibration(), reference, [""] * len(turned)).per_axis

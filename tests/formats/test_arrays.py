@@ -9,25 +9,19 @@ import h5py
 import nptdms
 import numpy as np
 import pytest
-import scipy.io
 
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.logs.arrays_by_name.hdf5 import opened
+from tests.formats.packed_files import mat_file
 from tests.formats.reading import FORCES, RATES, ROWS, proposed, read, require_motion
 
 TIME_S = np.arange(ROWS) * 0.005
 
 
-def _mat(content: dict[str, Any], packed: bool) -> bytes:
-    sink = io.BytesIO()
-    scipy.io.savemat(sink, content, do_compression=packed)
-    return sink.getvalue()
-
-
 @pytest.mark.parametrize("packed", [False, True])
 def test_a_mat_file_of_version_5_with_matrices_in_a_struct(packed: bool) -> None:
     content = {"imu": {"acc": FORCES, "gyro": RATES, "t": TIME_S}, "note": "at rest"}
-    proposal, recording = require_motion(_mat(content, packed), 0.0)
+    proposal, recording = require_motion(mat_file(content, do_compression=packed), 0.0)
     assert proposal.format == "mat5"
     assert proposal.description["time_column"] == "imu.t"
     assert any("unit of the gyros" in words for words in proposal.unknown)
@@ -39,7 +33,9 @@ def test_a_mat_file_of_version_5_with_matrices_in_a_struct(packed: bool) -> None
 def test_whole_doubles_that_matlab_stores_small_keep_their_sign(packed: bool) -> None:
     """A double class stored as int8 or uint16 comes back as numbers that do not wrap."""
     counts = np.array([[0.0, 100.0, -128.0]] * 4) - np.arange(4)[:, None]
-    data = _mat({"gyro": counts.astype(np.int16), "wide": np.full((4, 1), 60_000, np.uint16)}, packed)
+    data = mat_file(
+        {"gyro": counts.astype(np.int16), "wide": np.full((4, 1), 60_000, np.uint16)}, do_compression=packed
+    )
     description = {"unit": "U", "rate_hz": 10.0, "channels": [_count("gyro[0]"), _count("gyro[2]"), _count("wide")]}
     _, values = read(data, description)
     np.testing.assert_array_equal(values, np.column_stack([counts[:, 0], counts[:, 2], np.full(4, 60_000.0)]))
@@ -54,11 +50,11 @@ def test_a_mat_file_longer_than_a_block_is_read_whole(monkeypatch: pytest.Monkey
     monkeypatch.setattr("bench_service.formats.logs.arrays_by_name.mat5.BLOCK_ROWS", 7)
     monkeypatch.setattr("bench_service.formats.logs.arrays_by_name.mat5_source._PIECE", 100)
     for packed in (False, True):
-        require_motion(_mat({"gyro": RATES, "acc": FORCES, "t": TIME_S}, packed), 0.0)
+        require_motion(mat_file({"gyro": RATES, "acc": FORCES, "t": TIME_S}, do_compression=packed), 0.0)
 
 
 def test_mutated_mat_files_are_refused_with_the_place() -> None:
-    data = _mat({"gyro": RATES, "acc": FORCES, "t": TIME_S}, True)
+    data = mat_file({"gyro": RATES, "acc": FORCES, "t": TIME_S}, do_compression=True)
     at = len(data) - 500
     with pytest.raises(UnreadableFile, match=rf"is cut off at byte {at}: the variable at byte \d+ needs"):
         proposed(data[:at])
@@ -72,7 +68,7 @@ def test_mutated_mat_files_are_refused_with_the_place() -> None:
 
 def test_tables_of_matlab_are_refused_with_the_way_out() -> None:
     with pytest.raises(UnreadableFile, match="holds no matrix of samples: 'words' is text"):
-        proposed(_mat({"words": "nothing else"}, False))
+        proposed(mat_file({"words": "nothing else"}, do_compression=False))
 
 
 @pytest.mark.parametrize("chunks", [None, (64, 3)])

@@ -13,6 +13,7 @@ from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.logs.oxts import OXTS
 from bench_service.formats.proposal.model import Proposal
 from procedures.core.recording import Channel, Quantity, RecordingInfo
+from tests.formats.packed_files import kitti_drive, zipped
 from tests.formats.reading import FORCES, RATES, ROWS, TIMES_NS, proposed, read, require_motion
 
 
@@ -86,22 +87,8 @@ def test_a_file_of_a_phone_without_gravity_is_doubted() -> None:
     assert any("gravity seems to be taken off" in words for words in proposal.suspicious)
 
 
-def _kitti() -> bytes:
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as archive:
-        stamps = []
-        for row in range(ROWS):
-            values = np.zeros(len(OXTS))
-            values[[OXTS.index(n) for n in ("wx", "wy", "wz")]] = RATES[row]
-            values[[OXTS.index(n) for n in ("ax", "ay", "az")]] = FORCES[row]
-            archive.writestr(f"drive/oxts/data/{row:010d}.txt", " ".join(map(repr, values.tolist())) + "\n")
-            stamps.append(f"2011-09-26 13:02:{25 + row // 200:02d}.{row % 200 * 5:03d}456789\n")
-        archive.writestr("drive/oxts/timestamps.txt", "".join(stamps))
-    return packed.getvalue()
-
-
 def test_a_drive_of_kitti_in_a_zip() -> None:
-    data = _kitti()
+    data = zipped(kitti_drive("drive/oxts/"))
     proposal, _ = require_motion(data, 0.0)
     assert proposal.description["time_column"] == "timestamp"
     with pytest.raises(UnreadableFile, match="is a zip archive that is damaged or cut off"):

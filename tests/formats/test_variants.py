@@ -1,7 +1,6 @@
 """Ordinary variants of text exports, archives and array files: what is proposed of them, and what is asked."""
 
 import io
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,10 +9,9 @@ import h5py
 import nptdms
 import numpy as np
 import pytest
-import scipy.io
 
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.logs.oxts import OXTS
+from tests.formats.packed_files import kitti_drive, mat_file, zipped
 from tests.formats.reading import FORCES, RATES, ROWS, TIMES_NS, proposed, require_motion
 
 DEG = np.degrees(1.0)
@@ -127,7 +125,7 @@ def test_a_line_of_units_below_the_names_is_understood(units: str) -> None:
     text = _text(f"# a comment\ntime,gx,gy,gz,ax,ay,az\n{units}\n", lambda r: [f"{r * 0.005:.3f}", *_six(r, DEG)])
     proposal, _ = require_motion(text.encode(), ROUNDED, "labview.csv")
     assert (proposal.unknown, proposal.description["header_lines"], proposal.description["header"]) == ([], 3, False)
-    packed = require_motion(_zip({"labview.csv": text}), ROUNDED, "labview.zip")[0]
+    packed = require_motion(zipped({"labview.csv": text}), ROUNDED, "labview.zip")[0]
     assert packed.unknown == []
 
 
@@ -151,19 +149,11 @@ def test_whole_numbers_are_counts_whose_scale_is_asked_for() -> None:
     assert sum("give unit and scale" in words for words in proposal.unknown) == 2
 
 
-def _zip(members: dict[str, str]) -> bytes:
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as archive:
-        for name, text in members.items():
-            archive.writestr(name, text)
-    return packed.getvalue()
-
-
 def test_of_a_phones_archive_no_table_without_gravity_is_proposed() -> None:
     def text(values: Any) -> str:
         return _text("time,seconds_elapsed,z,y,x\n", lambda r: [TIMES_NS[r], f"{r * 0.005:.7f}", *values[r, ::-1]])
 
-    data = _zip(
+    data = zipped(
         {"Accelerometer.csv": text(FORCES / 100), "TotalAcceleration.csv": text(FORCES), "Gravity.csv": text(FORCES)}
     )
     proposal = proposed(data)
@@ -173,50 +163,33 @@ def test_of_a_phones_archive_no_table_without_gravity_is_proposed() -> None:
     assert any("without gravity" in words for words in doubted.unknown)
 
 
-def _oxts(folder: str) -> dict[str, str]:
-    members: dict[str, str] = {}
-    for row in range(ROWS):
-        values = dict.fromkeys(OXTS, 0.0) | dict(
-            zip(("wx", "wy", "wz", "ax", "ay", "az"), (*RATES[row], *FORCES[row]), strict=True)
-        )
-        members[f"{folder}data/{row:010d}.txt"] = " ".join(repr(float(v)) for v in values.values())
-    stamps = [f"2011-09-26 13:02:{25 + r // 200:02d}.{r % 200 * 5:03d}456789" for r in range(ROWS)]
-    return {**members, f"{folder}timestamps.txt": "\n".join(stamps) + "\n"}
-
-
 def test_a_drive_packed_from_inside_and_two_drives_in_one_archive() -> None:
-    require_motion(_zip(_oxts("")), 0.0)
-    both = _zip({**_oxts("a/oxts/"), **_oxts("b/oxts/")})
+    require_motion(zipped(kitti_drive("")), 0.0)
+    both = zipped({**kitti_drive("a/oxts/"), **kitti_drive("b/oxts/")})
     found = proposed(both)
     assert [t.name for t in found.tables] == ["a/oxts/", "b/oxts/"]
     assert any("are also in b/oxts/: give table" in words for words in found.notes)
     require_motion(both, 0.0, table="b/oxts/")
 
 
-def _mat(content: dict[str, Any], **how: Any) -> bytes:
-    sink = io.BytesIO()
-    scipy.io.savemat(sink, content, **how)
-    return sink.getvalue()
-
-
 @pytest.mark.parametrize("packed", [False, True])
 def test_matrices_of_matlab_that_lie_and_a_rate_that_is_stated(packed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bench_service.formats.logs.arrays_by_name.mat5.BLOCK_ROWS", 7)
-    data = _mat({"imu": {"wb": RATES.T, "fb": FORCES.T, "freq": 200.0, "heart_rate": 70.0}}, do_compression=packed)
+    data = mat_file({"imu": {"wb": RATES.T, "fb": FORCES.T, "freq": 200.0, "heart_rate": 70.0}}, do_compression=packed)
     proposal, _ = require_motion(data, 0.0)
     assert proposal.description["rate_hz"] == 200.0
     assert any("'imu.wb' is 3 x 600: its columns are taken as the samples" in words for words in proposal.notes)
 
 
 def test_two_stated_rates_are_none() -> None:
-    proposal = proposed(_mat({"gyro": RATES, "fs": 200.0, "mag": {"fs": 50.0}}))
+    proposal = proposed(mat_file({"gyro": RATES, "fs": 200.0, "mag": {"fs": 50.0}}))
     assert any("rate_hz" in words for words in proposal.unknown)
     assert any("'fs' = 200, 'mag.fs' = 50" in words for words in proposal.notes)
 
 
 def test_a_file_of_matlab_4_is_refused_with_the_way_out() -> None:
     with pytest.raises(UnreadableFile, match="a MATLAB file of version 4: in MATLAB or Octave save it again"):
-        proposed(_mat({"gyro": RATES}, format="4"))
+        proposed(mat_file({"gyro": RATES}, format="4"))
 
 
 def _hdf5(fill: Callable[[Any], None]) -> bytes:

@@ -16,6 +16,7 @@ from bench_service.bench.supervisor import Supervisor
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.model.errors import StorageFailure
 from bench_service.model.records import BenchStop
+from bench_service.wall_clock import monotonic_s, pause
 
 GONE = Driving(ProcessIdentity("nowhere", 1, "never"))
 
@@ -115,3 +116,11 @@ def supervised(
     channel = StopChannel(folder, "sim")
     channel.prepare()
     return Supervisor("sim", devices, watch, books, take_lease, channel, HeartbeatFile(folder, "sim"), **how)
+
+
+def look_for(supervisor: Supervisor, seconds: float) -> None:
+    """Let a supervisor look again and again."""
+    end_s = monotonic_s() + seconds
+    while monotonic_s() < end_s:
+        supervisor.look()
+        pause(0.05)

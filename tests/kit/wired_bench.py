@@ -1,8 +1,11 @@
-"""A bench file whose devices are served simulators, with the files of its unit and of the unit's frames."""
+"""A bench file whose devices are served simulators, with the files of its unit and of its frames; its driver."""
 
 from pathlib import Path
 from typing import Any
 
+from bench_service.bench.driver import BenchDriver
+from bench_service.drivers.composition import driver_of
+from bench_service.settings import Settings
 from simulators.served.unit_frames import CountFrames
 
 LANGUAGES = {"turntable": "acutrol", "supply": "scpi", "unit_link": "framed"}
@@ -72,3 +75,10 @@ frame = "frame.toml"
 time_factor = {factor}
 """)
     return path
+
+
+def wired_driver(folder: Path, behind: Any, factor: float, after_demand_s: float | None = None) -> BenchDriver:
+    """The service's driver of that bench; every job has the operator whom the bench file names."""
+    file = bench_file(folder, behind, factor, after_demand_s)
+    settings = Settings(database_url=f"sqlite:///{folder / 'b.sqlite'}", bench_file=file, bench_id="east")
+    return driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]

@@ -239,7 +239,7 @@ def test_corrections_are_listed_and_decided(bench: Bench, address: str) -> None:
     refused = bench("correction", "reject", "SIM-0001", old["id"], "--remark", "another unit", "--json").json()
     assert [d["act"] for d in refused["decisions"]] == ["chosen", "approved", "rejected"]
     shown = bench("corrections", "SIM-0001").out
-    assert "chosen" in shown
+    assert "chosen, not usable" in shown
     assert "another unit; make another correction" in shown
     one_line(bench("corrections", "SIM-0001", "--kind", "magnetic"), "kind")
     one_line(bench("correction", "choose", "SIM-0001", "none"), "correction")

@@ -16,6 +16,7 @@ from bench_service.cli.groups import services
 from bench_service.cli.processes import companion, serving
 from bench_service.cli.processes.ending import calling_at_end, ending_on_signals
 from bench_service.settings import Settings
+from bench_service.wall_clock import pause
 
 SIGNALS = [signal.SIGTERM, signal.SIGHUP]
 
@@ -56,7 +57,7 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def send_once_started(server: uvicorn.Server, number: signal.Signals) -> None:
     while not server.started:
-        pass
+        pause(0.001)
     os.kill(os.getpid(), number)
 
 
@@ -77,7 +78,7 @@ def test_a_signal_that_comes_while_the_service_is_opened_ends_it_once_it_runs(en
     ends.append("early")
     with serving.ready(Settings()) as server:
         server.run()
-    assert ends[-1] == "closed"
+    assert ends == ["early", "shut down", "closed"]
 
 
 def test_nohup_stays(ends: list[str]) -> None:

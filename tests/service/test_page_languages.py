@@ -5,7 +5,7 @@ import re
 from bench_service.model.job import JobState
 from bench_service.pages.languages import LANGUAGES, catalogue
 from procedures.core.limits import Verdict
-from tests.kit.page_texts import of_scripts, of_templates
+from tests.kit.page_texts import in_product, of_scripts, of_templates
 from tests.service.client import Client
 
 OF_VALUES = {str(state.value) for state in JobState} | {str(verdict.value) for verdict in Verdict}
@@ -18,6 +18,8 @@ def test_every_text_of_the_pages_is_translated_and_none_is_left_over() -> None:
         known = {entry.msgid for entry in catalogue(language) if entry.msgstr}
         assert (of_templates() | of_scripts() | OF_VALUES) - known == set()
         assert [entry.msgid for entry in catalogue(language) if not entry.msgstr] == []
+        others = known - of_templates() - of_scripts() - OF_VALUES
+        assert others - in_product(others) == set()
 
 
 def test_a_translation_has_the_places_of_its_text() -> None:

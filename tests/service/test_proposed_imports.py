@@ -38,7 +38,9 @@ def test_what_is_not_known_is_said(sqlite_client: Client) -> None:
     found = _describe(sqlite_client, UNSAID)
     assert found["description"]["unit"] is None
     assert found["unknown"][0] == "unit: the serial of the unit"
-    assert any("unit of the gyros (wx, wy, wz) is not said" in words for words in found["unknown"])
+    asked = next(words for words in found["unknown"] if "unit of the gyros (wx, wy, wz) is not said" in words)
+    doubts = {column["channel"]: column["unit_doubt"] for column in found["columns"]}
+    assert {channel for channel, doubt in doubts.items() if doubt == asked} == {"gyro_x", "gyro_y", "gyro_z"}
 
 
 def test_a_file_that_cannot_be_described_is_refused_in_words(sqlite_client: Client) -> None:

@@ -24,8 +24,7 @@ from bench_service.jobs.stop_keys import StopKeys
 from bench_service.model.errors import BenchBusy
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings
-from bench_service.wall_clock import monotonic_s, pause
-from tests.kit.supervised_bench import Books, Lease, Watch, identity, supervised
+from tests.kit.supervised_bench import Books, Lease, Watch, identity, look_for, supervised
 
 
 def test_no_process_drives_a_bench_from_the_folder_of_another_one_that_lives(
@@ -58,22 +57,15 @@ def test_a_suspended_worker_with_the_link_of_safe_devices_is_killed_when_it_leav
         tmp_path, RegisteredDevices(register), watch, Books(), Lease().take, unanswered_s=0.2, silent_s=0.2, hung_s=0.2
     )
     channel, word = StopChannel(tmp_path, "sim"), StopWord("smoke", "Olena", "command")
-
-    def look_for(seconds: float) -> None:
-        end_s = monotonic_s() + seconds
-        while monotonic_s() < end_s:
-            supervisor.look()
-            pause(0.05)
-
-    look_for(0.4)
+    look_for(supervisor, 0.4)
     assert worker.poll() is None, "safe devices need no heartbeat"
     assert channel.ask(word)
     channel.answer(WORKER, StopAnswer("the worker", frozenset({word.id})))
-    look_for(0.4)
+    look_for(supervisor, 0.4)
     assert worker.poll() is None, "it has answered"
     more = StopWord("more smoke", "Olena", "command")
     assert channel.ask(more)
-    look_for(0.6)
+    look_for(supervisor, 0.6)
     assert worker.poll() == -signal.SIGKILL
     assert channel.state(more.id) == "safe"
 

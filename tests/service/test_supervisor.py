@@ -17,7 +17,7 @@ from bench_service.model.errors import BenchBusy, StorageFailure
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench.errors import DeviceFault
 from tests.kit.abandoned_bench import abandoned
-from tests.kit.supervised_bench import GONE, Books, Lease, Watch, identity, state, supervised
+from tests.kit.supervised_bench import GONE, Books, Lease, Watch, identity, look_for, state, supervised
 
 
 def test_the_lease_is_taken_the_bench_made_safe_the_lease_given_back_and_all_of_it_noted(tmp_path: Path) -> None:
@@ -223,19 +223,12 @@ def test_devices_that_a_living_worker_has_left_unsafe_are_made_safe_without_any_
     supervisor = supervised(
         tmp_path, RegisteredDevices(register), Watch(Driving(identity(worker))), books, Lease().take
     )
-
-    def look_for(seconds: float) -> None:
-        end_s = monotonic_s() + seconds
-        while monotonic_s() < end_s:
-            supervisor.look()
-            pause(0.05)
-
-    look_for(0.5)
+    look_for(supervisor, 0.5)
     assert not state(tmp_path).safe, "the worker has their link"
     link.close()
-    look_for(0.2)
+    look_for(supervisor, 0.2)
     assert not state(tmp_path).safe, "the worker may make them safe over a new link"
-    look_for(0.6)
+    look_for(supervisor, 0.6)
     assert (state(tmp_path).safe, worker.poll()) == (True, None)
     assert "job-1: its worker has left it unsafe, and the table moves and the unit is on: made safe" in books.said[0]
     assert not books.is_stopped

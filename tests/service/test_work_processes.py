@@ -9,7 +9,8 @@ import psutil
 from bench_service.evidence.work_processes import Run, WorkProcesses
 from bench_service.wall_clock import monotonic_s, pause
 
-PATIENCE_S = 60.0
+LONGEST_S = 60.0
+"""Longest wait for the end of a process [s]."""
 
 
 def open_naming() -> Run:
@@ -22,7 +23,7 @@ def open_naming() -> Run:
 
 
 def gone(pid: int) -> bool:
-    until = monotonic_s() + PATIENCE_S
+    until = monotonic_s() + LONGEST_S
     while psutil.pid_exists(pid):
         if monotonic_s() > until:
             return False

@@ -29,15 +29,15 @@ def killed_after_s(folder: Path, hung_s: float, beats: bool) -> float | None:
     channel, heartbeat, worker = StopChannel(folder, "sim"), HeartbeatFile(folder, "sim"), ProcessIdentity.own()
     channel.prepare()
     heartbeat.prepare()
-    patience = WorkerTimeLimits(channel, heartbeat, UNANSWERED_S, hung_s, silent_s=10.0)
+    limits = WorkerTimeLimits(channel, heartbeat, UNANSWERED_S, hung_s, silent_s=10.0)
     word = StopWord("smoke", "Olena", "http")
     assert channel.ask(word)
     channel.answer(WORKER, StopAnswer("the worker", frozenset({word.id})))
-    patience.reset(0.0)
+    limits.reset(0.0)
     for look in range(200):
         if beats:
             heartbeat.beat()
-        if patience.over(look * STEP_S, worker, frozenset({word.id}), stopped=True) is not None:
+        if limits.over(look * STEP_S, worker, frozenset({word.id}), stopped=True) is not None:
             return look * STEP_S
     return None
 

@@ -153,6 +153,9 @@ def test_the_library_refuses_what_is_no_such_file_and_warns_of_one_that_is_not_f
         "[]",
         "{}",
         '{"format": "imucal", "version": 1}',
+        '{"format": "bench-calibration", "version": 1, "unit": "U-1", "triads": []}',
+        alone.read_text().replace('"calibration": ', '"calibrated": '),
+        alone.read_text().replace('"unusable": ', '"usable": '),
         both.read_text().replace('"b": [', '"b": [1,'),
     ):
         other.write_text(content)

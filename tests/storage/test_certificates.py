@@ -20,9 +20,8 @@ from bench_service.formats.certificate.laboratory import Laboratory, laboratory_
 from bench_service.formats.certificate.rules import attached, faults, schema_faults
 from bench_service.formats.certificate.signature import KeyPair, new_key, parsed, signed, verified
 from tests.kit.certificate_facts import TEXT
+from tests.kit.certificate_readers import SCHEMA, by_xmlsec, numbers_of
 from tests.kit.exported_calibrations import a_subject
-
-SCHEMA = Path(__file__).parents[3] / "shared" / "data" / "dcc"
 
 
 @pytest.fixture(scope="module")
@@ -42,14 +41,6 @@ def a_certificate(seed: int, laboratory: Laboratory, **changes: object) -> etree
     return certificate(json.loads(text), text, laboratory, "1.2.3")
 
 
-def by_xmlsec(data: bytes, pair: KeyPair) -> None:
-    """The other implementation. Raises `xmlsec.Error` where the signature is not valid."""
-    root = etree.fromstring(data)
-    context = xmlsec.SignatureContext()
-    context.key = xmlsec.Key.from_memory(pair.certificate, xmlsec.constants.KeyDataFormatCertPem)
-    context.verify(xmlsec.tree.find_node(root, "Signature"))
-
-
 def test_forty_random_units_are_valid_and_their_numbers_are_the_database_s(
     pair: KeyPair, laboratory: Laboratory
 ) -> None:
@@ -62,11 +53,8 @@ def test_forty_random_units_are_valid_and_their_numbers_are_the_database_s(
         if SCHEMA.is_dir():
             assert schema_faults(parsed(data), SCHEMA) == []
         subject = a_subject(seed, count=seed % 5 == 0)
-        for one, triad in zip(root.findall(".//si:realListXMLList", SPACES), subject.triads, strict=True):
-            words = (one.findtext("si:valueXMLList", "", SPACES)).split()
+        for (words, cells), triad in zip(numbers_of(root), subject.triads, strict=True):
             assert words == [repr(x) for x in triad.value.coefficients.tolist()]
-            columns = one.findall(".//si:columnXMLList", SPACES)
-            cells = [[float(c.text or "") for c in column.findall("*/si:valueXMLList", SPACES)] for column in columns]
             assert np.array(cells).T.tolist() == triad.value.covariance_array.tolist()
 
 

@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from math import isfinite
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one thread a worker
 
@@ -97,10 +98,9 @@ def beside(campaign: Campaign, values: Sequence[Sequence[Values]]) -> None:
     rows = foreseen(campaign, values)
     console = Console(width=150)
     console.print(table_of(rows))
-    apart = sum(not row.holds for row in rows)
-    told = (
-        f"{apart} of {len(rows)} checks scatter otherwise than foreseen, {LEVEL_OF_INTERVALS * len(rows):.1f} by chance"
-    )
+    judged = [row for row in rows if isfinite(row.high)]
+    apart, chance = sum(not row.holds for row in judged), LEVEL_OF_INTERVALS * len(judged)
+    told = f"{apart} of {len(judged)} checks scatter otherwise than foreseen, {chance:.1f} by chance"
     console.print(f"Preview beside outcome, root mean squares over runs: {told}.")
 
 

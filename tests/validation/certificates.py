@@ -24,10 +24,9 @@ from typing import Any
 import numpy as np
 import xmlschema
 import xmlsec
-from lxml import etree
 
 from bench_service.cli.asking.client import connect
-from bench_service.formats.certificate.document import SPACES, certificate
+from bench_service.formats.certificate.document import certificate
 from bench_service.formats.certificate.errors import CertificateRefused
 from bench_service.formats.certificate.laboratory import laboratory_of
 from bench_service.formats.certificate.rules import faults, schema_faults
@@ -35,9 +34,8 @@ from bench_service.formats.certificate.signature import KeyPair, new_key, parsed
 from bench_service.settings import Settings
 from procedures.core.imu_model import COEFFICIENT_NAMES, coefficient_unit
 from tests.kit.certificate_facts import TEXT
-
-SCHEMA = Path(__file__).parents[3] / "shared" / "data" / "dcc"
-TRIADS = {"gyro": "rad/s", "accelerometer": "m/s^2"}
+from tests.kit.certificate_readers import SCHEMA, by_xmlsec, numbers_of
+from tests.kit.exported_calibrations import UNITS
 
 
 def _entered(http: Any, unit: str, rng: np.random.Generator) -> list[str]:
@@ -49,7 +47,7 @@ def _entered(http: Any, unit: str, rng: np.random.Generator) -> list[str]:
         "/api/v1/recordings", files={"files": ("a.csv", b"gyro_x\n0.1\n0.2\n")}, data=form
     ).raise_for_status()
     ids: list[str] = []
-    for triad, si in TRIADS.items():
+    for triad, si in UNITS.items():
         k = np.diag(1.0 + rng.uniform(-0.02, 0.02, 3)) + rng.uniform(-0.01, 0.01, (3, 3))
         values = np.column_stack([rng.uniform(-0.1, 0.1, 3), k]).ravel()
         rows = [
@@ -79,12 +77,6 @@ def _correlated(text: str, rng: np.random.Generator) -> str:
     return json.dumps(document)
 
 
-def _by_xmlsec(data: bytes, pair: KeyPair) -> None:
-    context = xmlsec.SignatureContext()
-    context.key = xmlsec.Key.from_memory(pair.certificate, xmlsec.constants.KeyDataFormatCertPem)
-    context.verify(xmlsec.tree.find_node(etree.fromstring(data), "Signature"))
-
-
 def _changed(data: bytes, rng: np.random.Generator) -> bytes:
     """Change one digit of one value, by chance."""
     lists = list(re.finditer(rb"<si:valueXMLList>([^<]+)<", data))
@@ -102,7 +94,7 @@ def _refusals(data: bytes, pair: KeyPair) -> list[str]:
     except CertificateRefused:
         refused.append("signxml")
     try:
-        _by_xmlsec(data, pair)
+        by_xmlsec(data, pair)
     except xmlsec.Error:
         refused.append("xmlsec")
     return refused
@@ -110,13 +102,7 @@ def _refusals(data: bytes, pair: KeyPair) -> list[str]:
 
 def _of_certificate(root: Any) -> list[tuple[list[float], list[float]]]:
     """Coefficients and variances of each triad, as the certificate's digits say."""
-    found: list[tuple[list[float], list[float]]] = []
-    for one in root.findall(".//si:realListXMLList", SPACES):
-        values = [float(word) for word in one.findtext("si:valueXMLList", "", SPACES).split()]
-        columns = one.findall(".//si:columnXMLList", SPACES)
-        cells = [[float(c.text or "nan") for c in column.findall("*/si:valueXMLList", SPACES)] for column in columns]
-        found.append((values, [cells[i][i] for i in range(12)]))
-    return found
+    return [([float(w) for w in words], [cells[i][i] for i in range(12)]) for words, cells in numbers_of(root)]
 
 
 def _of_database(books: sqlite3.Connection, calibration: str) -> tuple[list[float], list[float]]:

@@ -21,13 +21,14 @@ from rich.table import Column, Table
 
 from procedures import catalog
 from procedures.core import units
-from procedures.core.imu_model import triad_calibration
+from procedures.core.imu_model import COEFFICIENT_NAMES, triad_calibration
 from procedures.core.recording import TRIADS, MemoryRecording
 from procedures.core.unit import TriadRecord, Unit
 from procedures.dwells import DwellParameters
 from procedures.procedure import Context
 from simulators.truth import Array, UnitTruth, declared_unit, random_unit_truth
 from simulators.world import WorldConfig, build, launch_truth
+from tests.kit.exported_calibrations import UNITS
 from tests.kit.procedures import recorded
 from tests.validation.population import SCENARIOS
 
@@ -35,9 +36,8 @@ RATE_HZ, LONGEST_S, TARGET_DEG_H = 20.0, 200.0, 0.02
 PROCEDURES = sorted(n for n, p in catalog.discover().items() if issubclass(p.params, DwellParameters))
 """Names of all procedures that take `stop_at`."""
 FIRST_SEED = 8_000_000
-RATE_UNITS = {"gyro": "rad/s", "accelerometer": "m/s^2"}
 WITHIN = 0.1
-"""Tolerance of the ratio of the two spreads, the issue's own."""
+"""Largest difference from 1 of the ratio of the two spreads that counts as none."""
 RESAMPLES = 4000
 EXACT = 1e-30 * np.eye(12)
 """Covariance of a calibration that is the truth."""
@@ -104,7 +104,7 @@ def known_unit(seed: int, name: str) -> Unit:
     if not name.startswith("verification"):
         return unit
     true = launch_truth(config, 1)
-    rows = ((t, u, np.column_stack(true[t]).ravel()) for t, u in RATE_UNITS.items())
+    rows = ((t, u, np.column_stack(true[t]).ravel()) for t, u in UNITS.items())
     return replace(unit, calibrations=tuple(triad_calibration(t, u, u, c, EXACT) for t, u, c in rows))
 
 
@@ -138,14 +138,13 @@ def _coefficients(result: Any, procedure: Any, config: WorldConfig, claims: dict
     errors, claimed, true = dict[str, Array](), dict[str, Array](), launch_truth(config, 1)
     for made in procedure.calibrations(result):
         difference = made.coefficients - np.column_stack(true[made.triad]).ravel()
-        names = [f"{made.triad}.{n}" for n in _NAMES]
+        names = [f"{made.triad}.{n}" for n in COEFFICIENT_NAMES]
         sd = np.array([claims[n] for n in names])
         for group, rows in _ROWS.items():
             errors[f"{made.triad} {group}"], claimed[f"{made.triad} {group}"] = difference[rows], sd[rows]
     return errors, claimed
 
 
-_NAMES = [name for i, axis in enumerate("xyz", 1) for name in (f"b_{axis}", *(f"K{i}{j}" for j in (1, 2, 3)))]
 _ROWS = {
     "b": [0, 4, 8],
     "K diagonal": [1, 6, 11],
@@ -156,7 +155,7 @@ _ROWS = {
 def _magnitudes(result: Any, _procedure: Any, _config: WorldConfig, claims: dict[str, float]) -> Groups:
     """Errors and claims of the corrected magnitudes at all stations, of each triad."""
     errors, claimed = dict[str, Array](), dict[str, Array]()
-    for triad, found in zip(("gyro", "accelerometer"), result.triads, strict=True):
+    for triad, found in zip(TRIADS, result.triads, strict=True):
         name, m = f"{triad} magnitude", found.magnitudes
         errors[name] = np.array(m.after) - m.reference
         claimed[name] = np.array([sd for n, sd in claims.items() if n.startswith(f"{triad}.magnitude")])

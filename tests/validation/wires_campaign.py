@@ -24,8 +24,6 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import chi2, norm
 
-from bench_service.drivers.composition import driver_of
-from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s
 from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.catalog import discover
@@ -35,7 +33,7 @@ from simulators.served.pace import MADE_UP_S
 from simulators.truth import declared_unit, default_unit
 from simulators.world import WorldConfig, build
 from tests.conformance.served import served
-from tests.kit.wired_bench import LANGUAGES, bench_file
+from tests.kit.wired_bench import LANGUAGES, wired_driver
 
 Figures = dict[str, tuple[float, float]]
 """Estimate and standard uncertainty by name."""
@@ -127,10 +125,7 @@ def _over_wires(factor: float, seed: int, told: Any) -> tuple[dict[str, Any], Be
         tempfile.TemporaryDirectory(prefix="wires-") as name,
         served(LANGUAGES, factor=factor, world=WorldConfig(seed=seed), made_up_s=MADE_UP_S) as behind,
     ):
-        folder = Path(name)
-        file = bench_file(folder, behind, factor, after_demand_s=0.02)
-        settings = Settings(database_url=f"sqlite:///{folder / 'b.sqlite'}", bench_file=file, bench_id="east")
-        driver = driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]
+        driver = wired_driver(Path(name), behind, factor, after_demand_s=0.02)
         results = _results(lambda: driver.open("GL017", None, None, BenchNeeds()), driver.description, told)
         told(f"{behind.bench.pace.behind_s:.0f} s of bench time given up")
         return results, driver.description

@@ -25,8 +25,6 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one thread
 
-from bench_service.drivers.composition import driver_of
-from bench_service.settings import Settings
 from procedures.bench import BenchNeeds
 from procedures.catalog import discover
 from procedures.core.errors import UnfitRecording
@@ -35,7 +33,7 @@ from simulators.served.pace import MADE_UP_S
 from simulators.truth import declared_unit, default_unit
 from simulators.world import WorldConfig
 from tests.conformance.served import Served, served
-from tests.kit.wired_bench import LANGUAGES, bench_file
+from tests.kit.wired_bench import LANGUAGES, wired_driver
 from tests.validation.wires_campaign import acquired
 
 RESPONSE = discover()["dynamic_response"]
@@ -51,10 +49,7 @@ def response(pace: float, stands: bool, seed: int, parameters: dict[str, Any]) -
         tempfile.TemporaryDirectory(prefix="wires-") as name,
         served(LANGUAGES, factor=pace, world=WorldConfig(seed=seed), made_up_s=MADE_UP_S) as behind,
     ):
-        folder = Path(name)
-        file = bench_file(folder, behind, 1.0, after_demand_s=0.02)
-        settings = Settings(database_url=f"sqlite:///{folder / 'b.sqlite'}", bench_file=file, bench_id="east")
-        driver = driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]
+        driver = wired_driver(Path(name), behind, 1.0, after_demand_s=0.02)
         context = Context(replace(declared_unit(default_unit()), serial="GL017"), driver.description)
         params = RESPONSE.resolve(RESPONSE.params.model_validate(parameters), context)
         bench = driver.open("GL017", None, None, BenchNeeds())
@@ -68,7 +63,7 @@ def response(pace: float, stands: bool, seed: int, parameters: dict[str, Any]) -
         try:
             found = RESPONSE.analyse(recordings, params, context)
         except UnfitRecording as refusal:
-            return f"refused: {refusal}"
+            return f"{REFUSED}{refusal}"
     for warning in found.warnings:
         print(f"  warning: {warning}")
     return _told(found)

@@ -28,8 +28,6 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import chi2, norm
 
-from bench_service.drivers.composition import driver_of
-from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.catalog import discover
@@ -41,7 +39,7 @@ from simulators.truth import declared_unit, default_unit
 from simulators.world import WorldConfig, build
 from tests.conformance.served import Served, served
 from tests.kit.thermal_plan import leg
-from tests.kit.wired_bench import PERSON, THERMAL_LANGUAGES, bench_file
+from tests.kit.wired_bench import PERSON, THERMAL_LANGUAGES, wired_driver
 from tests.validation.wires_campaign import acquired
 
 Told = Callable[[str], None]
@@ -99,10 +97,7 @@ def over_wires(factor: float, seed: int, rate_hz: float) -> tuple[Cycle, BenchDe
         tempfile.TemporaryDirectory(prefix="wires-") as name,
         served(LANGUAGES, thermal=True, factor=factor, world=world, made_up_s=MADE_UP_S) as behind,
     ):
-        folder = Path(name)
-        file = bench_file(folder, behind, factor, after_demand_s=0.02)
-        settings = Settings(database_url=f"sqlite:///{folder / 'b.sqlite'}", bench_file=file, bench_id="east")
-        driver = driver_of(settings, lambda _job, operator: operator)  # pyright: ignore[reportArgumentType]
+        driver = wired_driver(Path(name), behind, factor, after_demand_s=0.02)
         bench, before_s = driver.open("GL017", None, None, BenchNeeds(temperatures=True)), behind.bench.pace.behind_s
         try:
             found = cycle(bench, driver.description)

@@ -50,15 +50,8 @@ def choose(
     as_json: AsJson = False,
 ) -> None:
     """Make a calibration the one of its triad that new jobs use; one that failed needs a remark."""
-    body: dict[str, Any] = {"by": by, "remark": remark}
-    if (calibration_id is None) == (by_rule is None):
-        raise Refused("exactly one of CALIBRATION_ID and --by-rule TRIAD is needed")
-    if by_rule is not None:
-        body["triad"] = by_rule
-        path = RECORDS.path(unit, "choose-by-rule")
-    else:
-        path = RECORDS.path(unit, calibration_id or "", "choose")
-    RECORDS.post(context, path, body, server, as_json)
+    path, given = RECORDS.choice(unit, calibration_id, "choose", "triad", by_rule)
+    RECORDS.post(context, path, {"by": by, "remark": remark, **given}, server, as_json)
 
 
 RECORDS.add_approve_and_reject(calibration)

@@ -137,7 +137,7 @@ def check(
     from bench_service.formats.certificate.signature import parsed, verified
 
     try:
-        data = _xml_of(file)
+        data, printed = _xml_of(file)
         root, signer = verified(data, pinned.read_bytes())
         wrong = faults(root) + ([] if schema is None else schema_faults(parsed(data), schema))
         if wrong:
@@ -163,25 +163,25 @@ def check(
     if as_json:
         print(json.dumps(facts, indent=2))
     else:
-        _say(file, facts)
+        _say(f"{file}: the XML inside is" if printed else f"{file}:", facts, printed)
     if same is False:
         raise Refused(f"{file} is signed by {signer} and unchanged, but its raw data no longer give its numbers")
 
 
-def _xml_of(file: Path) -> bytes:
-    """The XML of a certificate, from the file or from inside a PDF. Raises `Refused`, `OSError`."""
+def _xml_of(file: Path) -> tuple[bytes, bool]:
+    """The XML of a certificate, and whether it was inside a PDF. Raises `Refused`, `OSError`."""
     from bench_service.formats.printed.attached import BEGINS, UnreadablePdf, attached_files
 
     data = file.read_bytes()
     if not data.startswith(BEGINS):
-        return data
+        return data, False
     try:
         found = attached_files(data).get(PRINTED_XML)
     except UnreadablePdf as error:
         raise Refused(f"{file}: {error}") from error
     if found is None:
         raise Refused(f"{file}: the PDF has no {PRINTED_XML} inside, so it is not a printed certificate")
-    return found
+    return found, True
 
 
 def _here(settings: Settings, server: str | None) -> bool:
@@ -208,10 +208,9 @@ def _repeated(
     return compared(document, answers)
 
 
-def _say(file: Path, facts: dict[str, Any]) -> None:
+def _say(begin: str, facts: dict[str, Any], printed: bool) -> None:
     lines = [
-        f"{file}: {'the XML inside is ' if file.suffix.lower() == '.pdf' else ''}valid, unchanged, signed by "
-        f"{facts['signed_by']}" + ("; the pages are not checked" if file.suffix.lower() == ".pdf" else ""),
+        f"{begin} valid, unchanged, signed by {facts['signed_by']}{'; the pages are not checked' if printed else ''}",
         f"unit {facts['unit']}, calibrations {', '.join(facts['calibrations'])}",
         "schema: " + ("valid" if facts["schema_checked"] else "not checked, see --schema"),
         *(f"raw data of the {triad} triad: {sentence}" for triad, sentence in facts["recomputed"].items()),

@@ -6,7 +6,6 @@ import typer
 
 from bench_service.cli.groups.decisions import By, Newest, Remark, UnitRecords
 from bench_service.cli.options import AsJson, Server
-from bench_service.cli.refusal import Refused
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -50,15 +49,8 @@ def choose(
     as_json: AsJson = False,
 ) -> None:
     """Make a correction the one of its kind that new jobs use; one of a result that failed needs a remark."""
-    body: dict[str, Any] = {"by": by, "remark": remark}
-    if (correction_id is None) == (by_rule is None):
-        raise Refused("exactly one of CORRECTION_ID and --by-rule KIND is needed")
-    if by_rule is not None:
-        body["kind"] = by_rule
-        path = RECORDS.path(unit, "choose-by-rule")
-    else:
-        path = RECORDS.path(unit, correction_id or "", "current")
-    RECORDS.post(context, path, body, server, as_json)
+    path, given = RECORDS.choice(unit, correction_id, "current", "kind", by_rule)
+    RECORDS.post(context, path, {"by": by, "remark": remark, **given}, server, as_json)
 
 
 RECORDS.add_approve_and_reject(correction)

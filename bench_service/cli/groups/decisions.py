@@ -9,6 +9,7 @@ import typer
 from bench_service.cli.asking.client import call, connect, segment
 from bench_service.cli.asking.lists import show
 from bench_service.cli.options import AsJson, Server, console
+from bench_service.cli.refusal import Refused
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -50,6 +51,18 @@ class UnitRecords:
                 console.print(one["unusable"], style="yellow", soft_wrap=True)
             if why := one.get("not_current"):  # calibrations have none: their verdict and origin say it
                 console.print(why, style="dim", soft_wrap=True)
+
+    def choice(
+        self, unit: str, record: str | None, verb: str, group: str, by_rule: str | None
+    ) -> tuple[str, dict[str, str]]:
+        """Return path and body of the choice of one record by `verb`, or of giving its `group` (a triad, a kind) back
+        to the rule. Raises `Refused` unless exactly one of the two is named.
+        """
+        if record is not None and by_rule is None:
+            return self.path(unit, record, verb), {}
+        if record is None and by_rule is not None:
+            return self.path(unit, "choose-by-rule"), {group: by_rule}
+        raise Refused(f"exactly one of {self.name.upper()}_ID and --by-rule {group.upper()} is needed")
 
     def post(self, context: typer.Context, path: str, body: dict[str, Any], server: str | None, as_json: bool) -> None:
         """Send a decision to the service, and print the record as it is then. Raises `Refused`."""

@@ -5,6 +5,8 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from bench_service.cli.printing.check_tables import is_inconclusive
+
 COLOURS = {"pass": "green", "fail": "red", "error": "yellow"}
 
 
@@ -15,7 +17,7 @@ def run_table(run: dict[str, Any]) -> Table:
     )
     for step in run["steps"]:
         bad = [c["name"] for c in step["checks"] if not c["passed"]]
-        failed = [c["name"] for c in step["checks"] if not c["passed"] and not c.get("bound", False)]
+        failed = [c["name"] for c in step["checks"] if not (c["passed"] or is_inconclusive(c))]
         missed = f"missed: {', '.join(failed)}" if failed else ""
         told = "\n".join(filter(None, [step["reason"], missed, *step["warnings"]]))
         passed = f"{len(step['checks']) - len(bad)}/{len(step['checks'])}"

@@ -7,6 +7,11 @@ from rich.table import Table
 from rich.text import Text
 
 
+def is_inconclusive(check: dict[str, Any]) -> bool:
+    """Return whether a check decided nothing: what was not observed stays below a value outside the limit."""
+    return check.get("bound", False) and not check["passed"]
+
+
 def check_table(document: dict[str, Any]) -> Table:
     """Return the table of a result's checks, each value next to its limit with its source; the notes stand below."""
     table = Table(title="Checks")
@@ -19,8 +24,7 @@ def check_table(document: dict[str, Any]) -> Table:
         bounds += [f"≤ {limit['maximum']:.4g}"] if limit["maximum"] is not None else []
         made = check.get("decision") or {}
         decided = made.get("outcome") or ("pass" if check["passed"] else "fail")
-        undecided = check.get("bound", False) and not check["passed"]
-        outcome = Text(decided, style="green" if check["passed"] else "yellow" if undecided else "red")
+        outcome = Text(decided, style="green" if check["passed"] else "yellow" if is_inconclusive(check) else "red")
         expanded = "" if made.get("expanded_uncertainty") is None else f"{made['expanded_uncertainty']:.2g}"
         source = Text(limit.get("source", ""))
         value = f"{'< ' if check.get('bound') else ''}{check['value']:.4g}"

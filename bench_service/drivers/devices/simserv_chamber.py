@@ -180,8 +180,8 @@ class SimservChamber:
         self._door = None
         if self._section.door_input:
             for index in range(1, min(MOST_INPUTS, int(put(Command.DIGITAL_INPUT_COUNT))) + 1):
-                request = simserv.request(Command.DIGITAL_INPUT_NAME, [str(index)])
-                if ask(Request(request, "an input's name", simserv.text_of)) == self._section.door_input:
+                data = simserv.request(Command.DIGITAL_INPUT_NAME, [str(index)])
+                if ask(Request(data, "an input's name", simserv.text_of)) == self._section.door_input:
                     self._door = index
 
 

@@ -122,7 +122,7 @@ class WiredDevices:
         kinds: list[Kind] = [kind for kind in SAFE if kind in unsafe and kind in real]
         context = context_of(file)
         work: dict[Kind, Callable[[], Coroutine[Any, Any, None]]] = {
-            kind: partial(_led_to_safety, partial(opened, file, (kind,), context), kind) for kind in kinds
+            kind: partial(_open_and_make_safe, partial(opened, file, (kind,), context), kind) for kind in kinds
         }
         failures: dict[Kind, Exception] = {}
 
@@ -137,8 +137,8 @@ class WiredDevices:
         return [_of_device(kind, failures[kind]) for kind in kinds if kind in failures]
 
 
-async def _led_to_safety(make: Callable[[], Mapping[Kind, Any]], kind: Kind) -> None:
-    """Make a device by its driver and lead it to safety, in its own thread: what fails here is its own failure."""
+async def _open_and_make_safe(make: Callable[[], Mapping[Kind, Any]], kind: Kind) -> None:
+    """Make a device by its driver and make it safe, in its own thread: what fails here is its own failure."""
     device = make()[kind]
     try:
         await device.connect()

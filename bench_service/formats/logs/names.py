@@ -12,8 +12,15 @@ from bench_service.formats.input_units import allowed_units, spelled
 from procedures.core.recording import Quantity
 
 _UNIT_IN_NAME = re.compile(r"[\[(\]{]\s*([^\[\](){}]+?)\s*[\])}]\s*$")
-_UNIT_AT_END = re.compile(r"_(?:rad|deg|m)_?(?:per|p)_?(?:s|h)_?\^?2?$|_m_?s_?\^?2$")
-"""Units that end a name without brackets, as those of our own exports do; their 2 is no index."""
+_UNIT_AT_END = re.compile(r"_((?:rad|deg|m)_?(?:per|p)_?[sh]_?\^?2?|m_?s_?\^?2|rads|degs|dps|degc|mg)$")
+"""Unit that ends a name without brackets, as in those of our own exports; its 2 is no index of an axis."""
+_ENDS = {"radps": "rad/s", "rads": "rad/s", "degps": "deg/s", "degs": "deg/s", "dps": "deg/s"} | {
+    "mps2": "m/s^2",
+    "ms2": "m/s^2",
+    "degc": "degC",
+    "mg": "mg",
+}
+"""Such ends without underscores, `per` as p, by the spelling that is used here."""
 _INDEX = re.compile(r"[\[(]?([0-2])[\])]?$")
 _RATE_WORDS = r"gyro|gyr|gyroscope|angular_?(?:rate|velocity|vel)|ang_?vel|omega|omg|w_rs_s|rotation_?rate|rot_?rate"
 _FORCE_WORDS = (
@@ -180,6 +187,6 @@ def _named_unit(name: str, quantity: Quantity) -> str | None:
     match = _UNIT_IN_NAME.search(name)
     if match is not None:
         return unit_of(match[1], quantity)
-    tail = name.lower().replace("_per_", "p").replace("m_s2", "mps2").replace("radps", "rads").replace("degps", "dps")
-    tail = tail.rsplit("_", 1)[-1]
-    return unit_of(tail, quantity) if tail in ("mps2", "dps", "rads", "degs", "degc", "mg") else None
+    if (end := _UNIT_AT_END.search(name.lower())) is None:
+        return None
+    return unit_of(_ENDS.get(re.sub(r"[_^]", "", end[1]).replace("per", "p"), ""), quantity)

@@ -38,6 +38,8 @@ class LogColumn:
     """Origin of quantity, unit and scale, in words."""
     doubt: str = ""
     """Sentence on a column that may be something else, by its name; empty: none."""
+    unit_doubt: str = ""
+    """Sentence on a unit that was guessed; empty: the file states the unit, or the values tell it."""
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,8 @@ MOST_FILES = 400_000
 _TEXTS = (".csv", ".txt", ".tsv")
 _SAMPLE = re.compile(r"^((?:.*/)?)data/\d+\.txt$")
 _AT_ONCE = 8192
+_NOT_UNPACKED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError)
+"""Errors that zipfile raises for a member that is damaged, encrypted or packed by a method that it does not know."""
 
 
 def begins(start: bytes) -> bool:
@@ -91,7 +93,7 @@ class Zipped:
     def _is_oxts(self, member: str) -> bool:
         try:
             return len(self._values(member)) == len(OXTS)
-        except (UnreadableFile, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError):
+        except (UnreadableFile, *_NOT_UNPACKED):
             return False
 
     def _open(self, member: str) -> BinaryIO:
@@ -110,7 +112,7 @@ class Zipped:
         try:
             drive = self._drives.get(table.name)
             yield from self._text_rows(table, columns) if drive is None else self._drive_rows(drive, columns)
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        except _NOT_UNPACKED as error:
             raise UnreadableFile(self._name, f"a file in the archive cannot be unpacked ({error})") from error
 
     def _drive_rows(self, drive: "_Drive", columns: Sequence[str]) -> Iterator[list[Numbers]]:

@@ -20,6 +20,9 @@ class ProposedColumn(_Part):
     source: str = Field(description="Where quantity, unit and scale come from, in words")
     mean: float | None = Field(None, description="Mean of the values, in `unit`; null: no finite value")
     deviation: float | None = Field(None, description="Standard deviation of the values, in `unit`")
+    unit_doubt: str | None = Field(
+        None, description="Sentence of `unknown` that asks about `unit`; null: the unit is no guess"
+    )
 
 
 class ProposedTable(_Part):

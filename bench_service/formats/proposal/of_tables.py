@@ -10,22 +10,17 @@ import pyarrow.parquet as pq
 
 from bench_service.formats.columnar import is_columnar
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.logs.dialects import guessed, in_dialect
+from bench_service.formats.logs.dialects import Understood, guessed, in_dialect
 from bench_service.formats.logs.names import is_time, time_unit
 from bench_service.formats.logs.table import LogClock, LogColumn, LogTable
 from bench_service.formats.text_look import TextLook, look
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table, the name of its format, and the fields that its description needs."""
+class Table(Understood):
+    """A table that is understood, with the fields that its description needs."""
 
-    format: str
-    title: str
-    table: LogTable
     fields: dict[str, Any] = field(default_factory=dict[str, Any])
-    time_units: dict[str, str] = field(default_factory=dict[str, str])
-    """Unit of a time column where the format or the name says it."""
 
 
 def table_of(stream: BinaryIO, name: str) -> Table:
@@ -58,7 +53,7 @@ def _columnar(stream: BinaryIO, name: str) -> Table:
             units[item.name] = item.type.unit if typed else (time_unit(item.name) or "")
         columns.append(guessed(item.name))
     title = "Parquet" if parquet else "Arrow"
-    return Table(title.lower(), title, LogTable("", tuple(columns), tuple(clocks), None, rows), {}, units)
+    return Table(title.lower(), title, LogTable("", tuple(columns), tuple(clocks), None, rows), units)
 
 
 def _text(found: TextLook, name: str) -> Table:
@@ -71,5 +66,4 @@ def _text(found: TextLook, name: str) -> Table:
         fields["header_lines"] = found.header_lines
     if found.names is None or found.units is not None:
         fields["header"] = False
-    text = in_dialect(found, name)
-    return Table(text.format, text.title, text.table, fields, text.time_units)
+    return Table(**vars(in_dialect(found, name)), fields=fields)

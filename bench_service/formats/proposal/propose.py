@@ -43,7 +43,8 @@ def propose(file: ImportFile, unit: str | None, form: str | None, table: str | N
     if not tables:
         raise UnreadableFile(file.name, "; ".join(["holds no table of samples", *log.warnings]))
     chosen = chosen_table(tables) if table is None else find_table(log, file.name, table, [])
-    looked = Table(found.NAME, found.TITLE, chosen, {"table": chosen.name} if len(tables) > 1 else {})
+    fields = {"table": chosen.name} if len(tables) > 1 else {}
+    looked = Table(found.NAME, found.TITLE, chosen, fields=fields)
     proposal = _proposed([Opened(file, log)], looked, tables, unit, form)
     return proposal.model_copy(update={"suspicious": [*log.warnings, *proposal.suspicious]})
 
@@ -227,6 +228,7 @@ def _column(column: LogColumn, place: int, values: Values) -> ProposedColumn:
         source=column.source,
         mean=column.scale * (mean - column.offset) if np.isfinite(mean) else None,
         deviation=abs(column.scale) * deviation if np.isfinite(deviation) else None,
+        unit_doubt=column.unit_doubt or None,
     )
 
 

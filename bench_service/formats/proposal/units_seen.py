@@ -48,11 +48,14 @@ def with_units(
         words = f"the unit of the {kind} ({', '.join(named)}) is not said; taken as {unit} ({why})"
         (notes if sure else asks).append(words)
         for i in places:
-            found[i] = replace(found[i], unit=unit, source=f"{found[i].source}, the unit a guess")
+            source = f"{found[i].source}, the unit a guess"
+            found[i] = replace(found[i], unit=unit, source=source, unit_doubt="" if sure else words)
     for i, column in enumerate(found):
         if column.unit is None and column.quantity is Quantity.TEMPERATURE:
-            found[i] = replace(column, unit="degC", source=f"{column.source}, the unit a guess")
-            asks.append(f"the unit of {column.name} is not said; taken as degC")
+            words = f"the unit of {column.name} is not said; taken as degC"
+            source = f"{column.source}, the unit a guess"
+            found[i] = replace(column, unit="degC", source=source, unit_doubt=words)
+            asks.append(words)
     return found, asks, notes
 
 

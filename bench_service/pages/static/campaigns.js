@@ -28,7 +28,7 @@ function start(name) {
   const form = h("form", {}, h("h2", {}, `${t("Start")} ${name}`), h("div", { class: "filters" }, ...on.labels, h("label", {}, t("Start at; empty: as soon as the bench is free"), day), look, go, output), seen);
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const key = crypto.randomUUID(), made = await busy(go, output, async () => day.value ? send("/api/v1/schedules", { ...onceAt(day.value), campaign: name, ...on.values() }, { key }) : send(`/api/v1/campaigns/${part(name)}/runs`, on.values(), { key }));
+    const key = crypto.randomUUID(), made = await busy(go, output, () => day.value ? send("/api/v1/schedules", { ...onceAt(day.value), campaign: name, ...on.values() }, { key }) : send(`/api/v1/campaigns/${part(name)}/runs`, on.values(), { key }));
     if (made && day.value) location.reload();
     else if (made) location.href = `/campaign-runs/${made.id}`;
   });
@@ -48,7 +48,7 @@ function schedule(name) {
   const on = target(), output = h("output", { role: "alert" }), often = h("select", {}, ...HOW_OFTEN.map(([value, text]) => h("option", { value }, text))), time = h("input", { type: "time", value: "01:00", required: true });
   const cron = h("input", { name: "cron", value: "0 1 * * *" }), where = h("input", { name: "zone", required: true, value: zone }), day = h("input", { type: "datetime-local" }), dayLabel = h("label", { hidden: true }, t("Start at"), day), zoneLabel = h("label", {}, t("Time zone"), where), cronLabel = h("label", { hidden: true }, t("Minute hour day month weekday"), cron), timeLabel = h("label", {}, t("At"), time);
   const missed = h("select", {}, h("option", { value: "run_once" }, t("one run makes up for it")), h("option", { value: "skip" }, t("it is left out"))), overlap = h("select", {}, h("option", { value: "skip" }, t("the new start is left out")), h("option", { value: "queue" }, t("the new one waits")));
-  often.addEventListener("change", () => { cronLabel.hidden = often.value !== ""; timeLabel.hidden = ["", "once"].includes(often.value); dayLabel.hidden = often.value !== "once"; zoneLabel.hidden = often.value === "once"; });
+  often.addEventListener("change", () => { cronLabel.hidden = often.value !== ""; timeLabel.hidden = ["", "once"].includes(often.value); dayLabel.hidden = often.value !== "once"; day.required = often.value === "once"; zoneLabel.hidden = often.value === "once"; });
   const times = () => {
     if (often.value === "once") return onceAt(day.value);
     if (often.value === "") return { cron: cron.value, time_zone: where.value };
@@ -59,7 +59,7 @@ function schedule(name) {
     h("label", {}, t("Where a start was missed"), missed), h("label", {}, t("While the run before is open"), overlap), h("button", { class: "go" }, t("Schedule")), output));
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const made = await busy(form.querySelector("button"), output, async () => send("/api/v1/schedules", { ...times(), campaign: name, missed: missed.value, overlap: overlap.value, ...on.values() }, { key: crypto.randomUUID() }));
+    const made = await busy(form.querySelector("button"), output, () => send("/api/v1/schedules", { ...times(), campaign: name, missed: missed.value, overlap: overlap.value, ...on.values() }, { key: crypto.randomUUID() }));
     if (made) location.reload();
   });
   open(form);

@@ -7,8 +7,8 @@ const POINTS = 1200;
 const ink = () => getComputedStyle(document.documentElement).getPropertyValue("--ink").trim() || "#222";
 const line = () => getComputedStyle(document.documentElement).getPropertyValue("--line").trim() || "#ccc";
 /** Labels of an axis by its step: the library rounds to three decimals, and small values are all "0". */
-export const ticks = (_, splits, _axis, _space, step) => splits.map((v) => v === null || v === undefined ? "" : step > 0 ? String(Number(v.toFixed(Math.min(15, Math.max(0, 1 + Math.ceil(-Math.log10(step))))))) : String(Number(v.toPrecision(4))));
-const axis = (label = "") => ({ label, values: ticks, stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line }, font: "12px system-ui", labelFont: "12px system-ui", size: 62 });
+const ticks = (_, splits, _axis, _space, step) => splits.map((v) => v === null || v === undefined ? "" : step > 0 ? String(Number(v.toFixed(Math.min(15, Math.max(0, 1 + Math.ceil(-Math.log10(step))))))) : String(Number(v.toPrecision(4))));
+export const axis = (label = "") => ({ label, values: ticks, stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line }, font: "12px system-ui", labelFont: "12px system-ui", size: 62 });
 
 function fitted(plot, element, height) {
   const observer = new ResizeObserver(() => plot.setSize({ width: Math.max(200, element.clientWidth - 8), height }));

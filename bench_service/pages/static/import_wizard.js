@@ -37,8 +37,7 @@ function row(channel, known, used) {
   quantity.addEventListener("change", () => { units(); write(); });
   units();
   for (const input of [use, as, scale]) input.addEventListener("change", write);
-  const own = { touched: false, proposed: channel.unit, channel: () => as.value.trim(), quantity: () => quantity.value, unit: () => unit.value,
-    names: [channel.name, channel.column].filter((one) => typeof one === "string" && one), last: unit.value, take: (value) => { unit.value = value; own.last = value; } };
+  const own = { touched: false, proposed: channel.unit, channel: () => as.value.trim(), quantity: () => quantity.value, unit: () => unit.value, doubt: known && known.unit_doubt, last: unit.value, take: (value) => { unit.value = value; own.last = value; } };
   unit.addEventListener("change", () => { triadFollows(own, own.last); own.last = unit.value; write(); });
   const element = h("tr", {}, h("td", {}, use), h("th", { scope: "row" }, String(channel.column ?? channel.name)), h("td", {}, as), h("td", {}, quantity), h("td", {}, unit), h("td", {}, scale), h("td", { class: "n" }, known && known.mean !== null && known.mean !== undefined ? number(Number(known.mean.toPrecision(4))) : ""), h("td", { class: "note" }, known ? known.source : ""));
   return { own, element, value: () => !use.checked ? null : { ...channel, name: as.value.trim(), quantity: quantity.value, unit: unit.value, scale: Number(scale.value) } };
@@ -64,9 +63,8 @@ function settle() {  // the questions that a person answers by looking
 
 function asked(text) {
   const box = h("input", { type: "checkbox" }), words = h("span", {}, text);
-  const named = (one) => one.names.some((name) => text.split(/[\s(),:;]+/).includes(name));
   box.addEventListener("change", settle);
-  doubts.push({ box, text, words, about: text.includes(" taken as ") ? rows.map((one) => one.own).filter(named) : [] });  // of units alone
+  doubts.push({ box, text, words, about: rows.map((one) => one.own).filter((one) => one.doubt === text) });
   return h("label", { class: "row warning" }, box, words);
 }
 

@@ -6,7 +6,7 @@ const FARTHEST_MS = 300 * 86400e3;  // a cron line has no year: one further ahea
 /** Fields of a schedule for a local moment of an input. Raises for one that has passed or is too far ahead. */
 export function onceAt(text) {
   const at = new Date(text);
-  if (!(at > new Date())) throw new Error(t("This time has passed."));
-  if (at - new Date() > FARTHEST_MS) throw new Error(t("A start may be at most 300 days ahead."));
+  if (!(at > new Date())) throw new Error(t("This time has passed: choose a later one."));
+  if (at - new Date() > FARTHEST_MS) throw new Error(t("A start may be at most 300 days ahead: choose an earlier time."));
   return { cron: `${at.getUTCMinutes()} ${at.getUTCHours()} ${at.getUTCDate()} ${at.getUTCMonth() + 1} *`, time_zone: "UTC", once: true };
 }

@@ -5,9 +5,11 @@ import { t } from "./words.js";
 
 const SHOWN = 40;
 
+const OF_MAGNITUDES = /^(gyro|accelerometer)\.sd after correction$/;  // of a verification: it is held to its limit as δ/√3
+
 /** Limits of the parameters that a predicted uncertainty is about: by triad and kind of coefficient, in the limit's unit. */
 function limitsFor({ name }, limits) {
-  const magnitude = /^(gyro|accelerometer)\.sd after correction$/.exec(name);  // a verification is held to δ/√3
+  const magnitude = OF_MAGNITUDES.exec(name);
   if (magnitude) return Object.entries(limits || {}).filter(([key, value]) => key.startsWith(`${magnitude[1]}_bias_in_run_`) && typeof value === "number");
   const found = /^(gyro|accelerometer)\.(b_[xyz]|K([123])\3)$/.exec(name);
   if (!found) return [];
@@ -25,7 +27,7 @@ function uncertainties(plan) {
   const rows = plan.predicted_uncertainties.map((one) => {
     const limits = limitsFor(one, plan.parameters.limits), [unit, size] = shownIn(one.unit);
     const against = limits.map(([key, limit]) => {
-      const [value, in_] = inLimitsUnit(key, one.standard_uncertainty / (key.includes("_in_run_") && one.name.endsWith("sd after correction") ? Math.sqrt(3) : 1));
+      const [value, in_] = inLimitsUnit(key, one.standard_uncertainty / (OF_MAGNITUDES.test(one.name) ? Math.sqrt(3) : 1));
       return h("div", {}, h("span", { class: `badge ${value > limit ? "fail" : "pass"}` }, `${doubt(value)} ${t("of")} ${limit} ${in_}`));
     });
     return h("tr", {}, h("th", { scope: "row" }, one.name), h("td", { class: "n" }, one.unit === "1" ? `${doubt(one.standard_uncertainty * 1e6)} ppm` : `${doubt(one.standard_uncertainty / size)} ${unit}`), h("td", {}, against));

@@ -1,12 +1,11 @@
 // The samples of a recording over any stretch: the service makes least, mean and greatest of each bin.
 import { part, read } from "./api.js";
 import { busy } from "./act.js";
-import { COLOURS, ticks } from "./charts.js";
+import { axis, COLOURS } from "./charts.js";
 import { h, number, shownIn } from "./dom.js";
 import { t } from "./words.js";
 
 const place = document.getElementById("plot"), form = place.querySelector("form"), length = Number(place.dataset.length), plots = new Map();
-const css = (name) => () => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 function groups(channels) {
   const found = new Map();
@@ -21,9 +20,8 @@ function draw(key, members, mids) {
   if (known) { known.setData(data); return; }
   const title = key.split(" ")[0], box = h("section", { class: "chart", "aria-label": title }, h("h3", {}, `${title}, ${unit}`));
   document.getElementById("charts").append(box);
-  const axis = (label) => ({ label, values: ticks, stroke: css("--ink"), grid: { stroke: css("--line"), width: 1 }, size: 66 });
   const value = (_, v) => number(v === null ? null : Number(v.toPrecision(6)));
-  const plot = new uPlot({ width: Math.max(240, box.clientWidth - 8), height: 260, scales: { x: { time: false } }, axes: [axis(t("time, s")), axis("")],
+  const plot = new uPlot({ width: Math.max(240, box.clientWidth - 8), height: 260, scales: { x: { time: false } }, axes: [axis(t("time, s")), axis()],
     series: [{ label: "t" }, ...members.flatMap((one, k) => { const stroke = COLOURS[k % COLOURS.length]; return [
       { label: `${one.name} ${t("least")}`, stroke: `${stroke}55`, width: 1, points: { show: false }, value }, { label: one.name, stroke, width: 1.4, points: { show: false }, value }, { label: `${one.name} ${t("greatest")}`, stroke: `${stroke}55`, width: 1, points: { show: false }, value }]; })],
     bands: members.map((_, k) => ({ series: [3 * k + 3, 3 * k + 1], fill: `${COLOURS[k % COLOURS.length]}22` })),

@@ -49,7 +49,7 @@ async function find(after = null) {
 }
 
 /** Chooses recordings that the address names, as another page has asked for; one that the list does not show is put first. */
-async function choseBefore(ids) {
+async function chooseNamed(ids) {
   for (const id of ids) {
     const one = await read(`/api/v1/recordings/${part(id)}`).catch(() => null);
     if (!one) continue;
@@ -100,7 +100,7 @@ at("analyse").addEventListener("submit", analyse);
 const wanted = new URLSearchParams(location.search);
 for (const [name, value] of wanted) if (search.elements[name]) search.elements[name].value = value;
 count();
-find().then(() => choseBefore(wanted.getAll("recording")));
+find().then(() => chooseNamed(wanted.getAll("recording")));
 read("/api/v1/methods").then((all) => {
   methods = all;
   batches.named(all);

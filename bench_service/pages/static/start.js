@@ -94,7 +94,7 @@ async function calibrateThenVerify() {  // a campaign of the service: nothing is
   const parameters = form.values(), { seed, labels } = extras();
   const body = { unit: unit(), ...(bench() && { bench: bench() }), ...(Object.keys(parameters).length && { parameters: { calibrate: parameters } }), seed, labels };
   const later = new FormData(at("terms")).get("not_before");
-  if (later && (body.parameters || seed !== undefined)) { at("refusal").textContent = t("A start at a time takes the default parameters and draws its seed: keep this plan as a campaign, then schedule that."); return; }
+  if (later && (body.parameters || seed !== undefined)) { at("refusal").textContent = t("A later start of both steps takes their default parameters and a random seed. Reset parameters and seed, clear the time, or schedule a campaign of your own with these steps."); return; }
   const run = await busy(at("go-both"), at("refusal"), () => later ? send("/api/v1/schedules", { campaign: BOTH, unit: body.unit, bench: body.bench, labels, ...onceAt(later) }, { key }) : send(`/api/v1/campaigns/${BOTH}/runs`, body, { key }));
   if (run) location.href = later ? "/campaigns#schedules" : `/campaign-runs/${run.id}`;
 }

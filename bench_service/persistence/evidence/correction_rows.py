@@ -10,7 +10,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 from bench_service import wall_clock
 from bench_service.evidence.corrections import StoredCorrection
 from bench_service.mapping import copied
-from bench_service.model.calibrations import Act, Approval, Decision
+from bench_service.model.calibrations import Act, Approval, Decision, takes_over
 from bench_service.model.errors import NotFound
 from bench_service.model.records import StoredResult
 from bench_service.persistence.tables.evidence import (
@@ -101,9 +101,9 @@ def add_corrections(
     if not corrections:
         return
     known = corrections_where(session, CorrectionRow.unit == result.unit, CorrectionRow.is_current)
-    standing = {c.correction.kind for c in known if not c.gives_way(wall_clock.now())}
+    current = {c.correction.kind: c for c in known}
     for correction in corrections:
-        make_current = by_rule and result.verdict is Verdict.PASS and correction.kind not in standing
+        make_current = by_rule and takes_over(result.verdict, current.get(correction.kind), wall_clock.now())
         if make_current:
             retire_current(session, result.unit, correction.kind)
         session.add(

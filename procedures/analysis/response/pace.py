@@ -9,7 +9,7 @@ from math import hypot, isfinite, pi, sqrt
 
 import numpy as np
 
-from procedures.analysis.response.phasors import Response, fitted
+from procedures.analysis.response.phasors import Response, fitted_piece
 from procedures.analysis.response.trace import Samples
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -20,8 +20,6 @@ MOST_DIFFERENCE = 1e-3
 CLOCK_SIGMAS = 4.0
 """Standard uncertainties beyond which a difference of the clocks is told."""
 PIECES, LEAST_PIECES = 8, 3
-SCATTERS = 3.0
-"""Scatters of the samples' arrival that are no difference of the clocks."""
 CYCLES, READINGS = 2.0, 8
 """Least number of cycles and of readings in a piece."""
 STEP_SIGMAS = 6.0
@@ -38,14 +36,12 @@ CAUSES = (
 def require_measured_pace(info: RecordingInfo) -> None:
     """Check the pace that was measured while the samples came, where it was. Raises `UnfitRecording`."""
     pace = None if info.measured is None else info.measured.pace
-    length_s = info.count / info.rate_hz
-    if pace is None or abs(pace.behind_s) <= max(MOST_DIFFERENCE * length_s, SCATTERS * pace.scatter_s):
+    if pace is None or not pace.differs(MOST_DIFFERENCE, info.duration_s):
         return
     label = info.id if info.station is None else info.station.label
-    way = "fell behind" if pace.behind_s > 0.0 else "were ahead of"
     raise UnfitRecording(
-        f"station {label}: the unit's samples {way} the bench's clock by {abs(pace.behind_s):.3g} s within the "
-        f"recording of {length_s:.6g} s: {CAUSES}"
+        f"station {label}: {pace.said} by {abs(pace.behind_s):.3g} s within the recording of "
+        f"{info.duration_s:.6g} s: {CAUSES}"
     )
 
 
@@ -80,15 +76,12 @@ def _delays(samples: Samples, omega: float, length_s: float, pieces: int) -> tup
     None where a piece has too few readings. The deviations take what is beside the sinusoid as white, which more
     noise than the unit's record has makes larger, and a step between two pieces does not.
     """
-    encoder, found, deviations = samples.encoder, list[complex](), list[float]()
+    found, deviations = list[complex](), list[float]()
     for k in range(pieces):
-        begin_s, end_s = k * length_s / pieces, (k + 1) * length_s / pieces
-        own = (samples.time_s >= begin_s) & (samples.time_s < end_s)
-        read = (encoder.time_s >= begin_s) & (encoder.time_s < end_s)
-        if np.count_nonzero(read) < READINGS:
+        piece = fitted_piece(samples, omega, (k * length_s / pieces, (k + 1) * length_s / pieces), READINGS)
+        if piece is None:
             return None
-        gyro = fitted(samples.time_s[own], samples.rate_rad_s[own], omega, samples.label)
-        angle = fitted(encoder.time_s[read], encoder.angle_rad[read], omega, samples.label)
+        gyro, angle = piece
         found.append(gyro.value / angle.value)
         deviations.append(hypot(gyro.scatter / abs(gyro.value), angle.scatter / abs(angle.value)))
     phases = np.unwrap(np.angle(np.array(found) / found[0]), period=2.0 * pi)

@@ -69,6 +69,10 @@ def density(noise: NoiseCoefficients, frequency_hz: float, rate_hz: float) -> fl
     return 2.0 * noise.random_walk**2 + slow + 8.0 * noise.quantization**2 * rate_hz * np.sin(pi * f / rate_hz) ** 2
 
 
+LEAST_READINGS = 5
+"""Least number of the encoder's readings in half a recording, for a drift: the fit has four terms."""
+
+
 def response(samples: Samples, frequency_hz: float, noise: NoiseCoefficients | None) -> Response:
     """Response at a frequency. `noise`: of the channel by the unit's record; None: that beside the sinusoid is used.
 
@@ -97,8 +101,18 @@ def response(samples: Samples, frequency_hz: float, noise: NoiseCoefficients | N
     require_known(samples.label, max(gain_sd, phase_sd))
     drift, drift_sd = _drift(samples, omega, length_s, phase_sd)
     return Response(
-        *(samples.label, frequency_hz, abs(theta), value, gain_sd, phase_sd),
-        *(ratio, degrees, encoder.within_s, drift, drift_sd, length_s),
+        label=samples.label,
+        frequency_hz=frequency_hz,
+        amplitude_rad=abs(theta),
+        value=value,
+        gain_sd=gain_sd,
+        phase_sd=phase_sd,
+        noise_ratio=ratio,
+        noise_degrees=degrees,
+        within_s=encoder.within_s,
+        drift=drift,
+        drift_sd=drift_sd,
+        length_s=length_s,
     )
 
 
@@ -205,17 +219,31 @@ def _beside(
     return found
 
 
+def fitted_piece(
+    samples: Samples, omega: float, span_s: tuple[float, float], least: int
+) -> tuple[Fitted, Fitted] | None:
+    """Return the phasors of rate and encoder within a span of the recording [s], its end left out; None for fewer than
+    `least` readings of the encoder. Raises as `fitted`.
+    """
+    encoder, (begin_s, end_s) = samples.encoder, span_s
+    own = (samples.time_s >= begin_s) & (samples.time_s < end_s)
+    read = (encoder.time_s >= begin_s) & (encoder.time_s < end_s)
+    if np.count_nonzero(read) < least:
+        return None
+    return (
+        fitted(samples.time_s[own], samples.rate_rad_s[own], omega, samples.label),
+        fitted(encoder.time_s[read], encoder.angle_rad[read], omega, samples.label),
+    )
+
+
 def _drift(samples: Samples, omega: float, length_s: float, phase_sd: float) -> tuple[float, float]:
     """Phase of the second half less that of the first, over ω·T/2, and its standard deviation ``4·sd/(ωT)``."""
     phases: list[complex] = []
-    encoder = samples.encoder
-    for half in (0, 1):
-        own = (samples.time_s * 2.0 >= length_s) == bool(half)
-        other = (encoder.time_s * 2.0 >= length_s) == bool(half)
-        if np.count_nonzero(other) < 5:
-            return 0.0, float("inf")
-        gyro = fitted(samples.time_s[own], samples.rate_rad_s[own], omega, samples.label)
-        theta = fitted(encoder.time_s[other], encoder.angle_rad[other], omega, samples.label)
+    for span_s in ((-inf, 0.5 * length_s), (0.5 * length_s, inf)):
+        half = fitted_piece(samples, omega, span_s, LEAST_READINGS)
+        if half is None:
+            return 0.0, inf
+        gyro, theta = half
         phases.append(gyro.value / theta.value)
     # Each half has √2 times the whole's deviation; their difference √2 times that again.
     return float(np.angle(phases[1] / phases[0])) / (0.5 * omega * length_s), 4.0 * phase_sd / (omega * length_s)

@@ -89,7 +89,7 @@ async def giving_up() -> None:
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_a_device_that_takes_its_declared_time_is_not_cut_short(device: str) -> None:
-    """Beyond the 0.25 s of a verb: a declared patience that the watchdog does not honour is none."""
+    """Beyond the 0.25 s of a verb: the watchdog would end it there without the declared time."""
     slow_s = DECLARED_S[device] - 0.1
     devices = Devices(**{device: takes(slow_s)})
     bench = devices.driven()
