@@ -11,6 +11,7 @@ from math import ceil
 from pydantic import Field
 
 from procedures import steps
+from procedures.analysis.averaging_time import averaging_time
 from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.launch.prediction import predicted_noise, unresolved_noise
 from procedures.bench import Bench
@@ -167,10 +168,22 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
             old = records[triad] or TriadRecord((noise[x], noise[y], noise[z]))
             found = {"noise": (noise[x], noise[y], noise[z]), "not_observed": (absent[x], absent[y], absent[z])}
             records[triad] = replace(old, noise_origin=origin, **found)
-    dwell = unit.averaging_time_s
-    if result.averaging_time_s is not None:
-        dwell = DWELL_STEP_S * ceil(result.averaging_time_s / DWELL_STEP_S)
+    dwell = unit.averaging_time_s if result.averaging_time_s is None else _whole_steps(result.averaging_time_s)
     return replace(unit, gyro=records["gyro"], accelerometer=records["accelerometer"], averaging_time_s=dwell)
+
+
+def expected_averaging_time(_params: Params, context: Context) -> float | None:
+    """Return the averaging time that the unit's record is expected to have afterwards, by the noise that it has now
+    [s]; None where that noise is not known, or has no such time.
+    """
+    records = [record for triad in TRIADS if (record := context.unit.triad(triad)) is not None]
+    times = [averaging_time(noise).tau_s for record in records for noise in record.observed_noise]
+    longest = max((t for t in times if t), default=None)
+    return None if longest is None else _whole_steps(longest)
+
+
+def _whole_steps(time_s: float) -> float:
+    return DWELL_STEP_S * ceil(time_s / DWELL_STEP_S)
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
@@ -210,6 +223,7 @@ PROCEDURE = Procedure(
     analyse,
     report,
     learns=learns,
+    expected_averaging_time=expected_averaging_time,
     quantities=quantities,
     planned_checks=planned_checks,
     inspection=lambda _: LAUNCH,
