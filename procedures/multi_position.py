@@ -29,14 +29,15 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, triad_calibration
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import OURS, SIGNIFICANCE, Check, Limit, check, significance, verdict
 from procedures.core.recording import Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
 from procedures.dwells import saved_tables
-from procedures.procedure import JudgedParameters, Outcome, PredictedUncertainty
+from procedures.parameters import JudgedParameters, Parameters
+from procedures.procedure import Outcome, PredictedUncertainty
 from procedures.reports import calibration as pictures
 
 TriadName = Literal["accelerometer", "gyro"]
@@ -228,49 +229,49 @@ def _of(extended: Sequence[Extended], summary: TriadSummary) -> Extended | None:
     return next((e for e in extended if e.calibration.triad == summary.calibration.triad), None)
 
 
-def triad_checks(
-    t: TriadSummary, in_run_maximum: float, condition_max: float, residual_p_value_min: float
-) -> list[Check]:
+def in_run_limit(triad: str, limits: Parameters) -> Limit:
+    """Return the limit on a triad's error per axis with its source; no maximum where `limits` has none."""
+    field, unit = {"gyro": ("gyro_bias_in_run_deg_h", "deg/h")}.get(triad, ("accelerometer_bias_in_run_m_s2", "m/s^2"))
+    return Limit(unit, maximum=getattr(limits, field), source=limits.source_of(field, IN_RUN_SOURCE))
+
+
+def triad_checks(t: TriadSummary, in_run: Limit, limits: Parameters) -> list[Check]:
     """Return the checks of a triad's calibration: error per axis in sample, condition, and residuals by p-value or
-    misfit.
+    misfit. `limits` has `condition_max` and `residual_p_value_min`.
     """
-    triad, m = t.calibration.triad, t.magnitudes
-    unit, size = units.DISPLAY[m.unit]
-    checks = [
-        check(
-            f"{triad} bias in run, δ/√3",
-            m.per_axis / size,
-            Limit(unit, maximum=in_run_maximum, source=IN_RUN_SOURCE),
-            m.per_axis_sd / size,
-            degrees_of_freedom=len(m.after) - 1.0,
-        ),
-        check(f"{triad} condition number", t.condition, Limit("1", maximum=condition_max)),
-    ]
-    checks.append(own_axis_check(triad, t.calibration.matrix_array))
-    if t.p_value is not None:
-        name = f"{triad} residuals, p-value of chi-square"
-        checks.append(significance(name, t.p_value, residual_p_value_min, t.residual_note))
-    elif t.misfit is not None:
-        limit = Limit("1", maximum=MISFIT_MAX, source="ours")
-        checks.append(
-            check(f"{triad} residuals over what noise and table allow", t.misfit, limit, note=f"worst: {t.worst}")
-        )
-    return checks
+    name, m = f"{t.calibration.triad} bias in run, δ/√3", t.magnitudes
+    size, freedom = units.DISPLAY[m.unit][1], len(m.after) - 1.0
+    in_sample = check(name, m.per_axis / size, in_run, m.per_axis_sd / size, degrees_of_freedom=freedom)
+    of_fit = (t.condition, t.calibration.matrix_array, t.p_value, t.misfit)
+    return [in_sample, *_fit_checks(t, *of_fit, limits, "noise and table")]
 
 
 def _checks(t: TriadSummary, extended: Extended | None, params: FitParameters) -> list[Check]:
-    triad = t.calibration.triad
-    condition = t.condition if extended is None else extended.condition
-    checks = [check(f"{triad} condition number", condition, Limit("1", maximum=params.condition_max))]
-    checks.append(own_axis_check(triad, (extended or t).calibration.matrix_array))
-    p_value = t.p_value if extended is None else extended.p_value
+    of = extended or t
+    misfit = t.misfit if extended is None else None
+    of_fit = (of.condition, of.calibration.matrix_array, of.p_value, misfit)
+    return _fit_checks(t, *of_fit, params, "noise and positions")
+
+
+def _fit_checks(
+    t: TriadSummary,
+    condition: float,
+    matrix: Array,
+    p_value: float | None,
+    misfit: float | None,
+    limits: Parameters,
+    allowing: str,
+) -> list[Check]:
+    """Checks of condition, own axes, and residuals by p-value or misfit."""
+    triad, most, level = t.calibration.triad, "condition_max", "residual_p_value_min"
+    limit = Limit("1", maximum=getattr(limits, most), source=limits.source_of(most))
+    checks = [check(f"{triad} condition number", condition, limit), own_axis_check(triad, matrix)]
     if p_value is not None:
-        name = f"{triad} residuals, p-value of chi-square"
-        checks.append(significance(name, p_value, params.residual_p_value_min, t.residual_note))
-    elif t.misfit is not None and extended is None:
-        limit = Limit("1", maximum=MISFIT_MAX, source="ours")
-        name = f"{triad} residuals over what noise and positions allow"
-        checks.append(check(name, t.misfit, limit, note=f"worst: {t.worst}"))
+        name, source = f"{triad} residuals, p-value of chi-square", limits.source_of(level, SIGNIFICANCE)
+        checks.append(significance(name, p_value, getattr(limits, level), t.residual_note, source))
+    elif misfit is not None:
+        limit = Limit("1", maximum=MISFIT_MAX, source=OURS)
+        checks.append(check(f"{triad} residuals over what {allowing} allow", misfit, limit, note=f"worst: {t.worst}"))
     return checks
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from procedures.core.errors import BadParameter
-from procedures.core.limits import COVERAGE, Rule, RuleName
+from procedures.core.limits import COVERAGE, OURS, Rule, RuleName, source_of
 
 
 class Parameters(BaseModel):
@@ -17,6 +17,10 @@ class Parameters(BaseModel):
     def filled(self, defaults: Mapping[str, Any]) -> Self:
         """Return the parameters with each None replaced by its default, where there is one."""
         return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
+
+    def source_of(self, limit: str, own: str = OURS) -> str:
+        """Return the source of the limit in this field: `own` for the field's default, the request for other values."""
+        return source_of(getattr(self, limit), type(self).model_fields[limit].default, own)
 
 
 class DecisionRules(Parameters):

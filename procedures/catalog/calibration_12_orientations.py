@@ -41,11 +41,11 @@ from procedures.core import units
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, verdict
+from procedures.core.limits import SIGNIFICANCE, Limit, PlannedCheck, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.dwells import DwellParameters, expected_stations, saved_tables
-from procedures.multi_position import predicted, triad_checks
+from procedures.multi_position import in_run_limit, predicted, triad_checks
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.site_parameters import TableParameters, declared_table
@@ -187,7 +187,9 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     )
     second, fit, share, doubts = analyse_accelerometers(recordings, site, uncertainty, accelerometer, settings)
     triads = suspected([first, (second, fit)])
-    checks = tuple(c for t in triads for c in _checks(t, params.limits))
+    checks = tuple(
+        c for t in triads for c in triad_checks(t, in_run_limit(t.calibration.triad, params.limits), params.limits)
+    )
     warnings = _warnings(params, plans) + launch_warnings(recordings) + doubts
     return Result(
         checks=checks,
@@ -213,12 +215,12 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
     """Return the planned checks of the error per axis δ/√3, in sample."""
     params = resolve(params, context)
-    limits = params.limits
-    maxima = {"gyro": limits.gyro_bias_in_run_deg_h, "accelerometer": limits.accelerometer_bias_in_run_m_s2}
-    level = limits.residual_p_value_min
-    name, limit = "residuals, p-value of chi-square", Limit("1", minimum=level, source="ours: a test of significance")
-    plans = {triad: _plan(triad, params, context) for triad in TRIAD_NAMES}
-    found = [in_run_check(plan, maxima[triad], in_sample_covariance(plan)) for triad, plan in plans.items()]
+    level, source = params.limits.residual_p_value_min, params.limits.source_of("residual_p_value_min", SIGNIFICANCE)
+    name, limit = "residuals, p-value of chi-square", Limit("1", minimum=level, source=source)
+    found: list[PlannedCheck] = []
+    for triad in TRIAD_NAMES:
+        plan, in_run = _plan(triad, params, context), in_run_limit(triad, params.limits)
+        found.append(in_run_check(plan, in_run.maximum, in_sample_covariance(plan), source=in_run.source))
     return (*found, *(PlannedCheck(f"{triad} {name}", limit, level=level) for triad in TRIAD_NAMES))
 
 
@@ -281,12 +283,6 @@ def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
         if p.at_dwell() is None
     ]
     return tuple(w for w in (*found, *unknown) if w is not None)
-
-
-def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
-    gyro = t.calibration.triad == "gyro"
-    in_run = limits.gyro_bias_in_run_deg_h if gyro else limits.accelerometer_bias_in_run_m_s2
-    return triad_checks(t, in_run, limits.condition_max, limits.residual_p_value_min)
 
 
 PROCEDURE = Procedure(

@@ -189,25 +189,29 @@ def _warnings(sensor_c: list[float], params: Params) -> tuple[str, ...]:
     return tuple(found)
 
 
+def _limit(limits: Limits, unit: str, field: str) -> Limit:
+    return Limit(unit, maximum=getattr(limits, field), source=limits.source_of(field))
+
+
 def _checks(channel: ChannelResult, limits: Limits) -> list[Check]:
     scale, zero, name = channel.model.scale, channel.model.zero, channel.name
     low, high = min(channel.sensor_c), max(channel.sensor_c)
     ppm = units.PPM * abs(scale.at_reference)
     zero_sd = float(np.sqrt(zero.covariance[0][0]))
     return [
-        check(f"{name} zero", abs(zero.at_reference), Limit("codes", maximum=limits.zero_codes), zero_sd),
+        check(f"{name} zero", abs(zero.at_reference), _limit(limits, "codes", "zero_codes"), zero_sd),
         check(
             f"{name} zero, largest change",
             zero.largest_change(low, high),
-            Limit("codes", maximum=limits.zero_change_codes),
+            _limit(limits, "codes", "zero_change_codes"),
         ),
         check(
             f"{name} scale, largest change",
             scale.largest_change(low, high) / ppm,
-            Limit("ppm", maximum=limits.scale_change_ppm),
+            _limit(limits, "ppm", "scale_change_ppm"),
         ),
-        check(f"{name} zero about Fs", zero.residual_sd, Limit("codes", maximum=limits.zero_residual_codes)),
-        check(f"{name} scale about Fc", scale.residual_sd / ppm, Limit("ppm", maximum=limits.scale_residual_ppm)),
+        check(f"{name} zero about Fs", zero.residual_sd, _limit(limits, "codes", "zero_residual_codes")),
+        check(f"{name} scale about Fc", scale.residual_sd / ppm, _limit(limits, "ppm", "scale_residual_ppm")),
     ]
 
 

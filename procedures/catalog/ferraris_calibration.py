@@ -139,9 +139,8 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
     """Return the planned checks of the scale factors' uncertainty, by the plan, and of the residuals."""
     params = resolve(params, context)
     sd = {u.name: u.standard_uncertainty / units.PPM for u in _gyro(params, context, schedule(params))}
-    limit = Limit("ppm", maximum=params.limits.gyro_scale_3_sigma_ppm, source="ours")
-    level = params.limits.residual_p_value_min
-    test = Limit("1", minimum=level, source="ours: a test of significance")
+    limit, level = params.limits.of_scale, params.limits.residual_p_value_min
+    test = Limit("1", minimum=level, source=params.limits.level_source)
     scale = [
         PlannedCheck(f"gyro scale factor {axis}, 3σ", limit, None, None, 3.0 * sd[f"gyro.K{k}{k}"])
         for k, axis in enumerate(AXES, start=1)

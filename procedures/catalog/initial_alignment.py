@@ -35,7 +35,7 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
@@ -205,11 +205,11 @@ def _basis(context: Context) -> str:
 
 
 def _checks(angles: Sequence[AngleErrors], limits: Limits) -> tuple[Check, ...]:
-    most = Limit("deg", limits.heading_sd_max_deg, source="ours")
+    most = Limit("deg", limits.heading_sd_max_deg, source=limits.source_of("heading_sd_max_deg"))
     found = [check("heading, expected standard uncertainty of one alignment", angles[0].expected_sd_deg, most)]
-    level = limits.prediction_p_value_min
+    level, source = limits.prediction_p_value_min, limits.source_of("prediction_p_value_min", SIGNIFICANCE)
     found += [
-        significance(f"{a.angle} errors as predicted, p-value of chi-square", a.p_value, level)
+        significance(f"{a.angle} errors as predicted, p-value of chi-square", a.p_value, level, source=source)
         for a in angles
         if a.p_value is not None
     ]

@@ -17,7 +17,7 @@ from procedures.analysis.turns.polarity import Answers, answers, sentences
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import ASKED, OURS, Check, Limit, check, verdict
 from procedures.core.recording import AXES, TRIADS, Recording, Station
 from procedures.core.report import Report, Table
 from procedures.core.turn import Turn
@@ -137,8 +137,10 @@ def _turn(params: Params) -> Turn:
 
 
 def _checks(found: Answers, limits: Limits) -> list[Check]:
-    own = Limit("1", None if found.relative else limits.own_max, limits.own_min, source="ours")
-    other = Limit("1", limits.other_max, source="ours")
+    most = None if found.relative else limits.own_max
+    sources = (limits.source_of("own_min"), OURS if found.relative else limits.source_of("own_max"))
+    own = Limit("1", most, limits.own_min, source=max(sources, key=lambda s: s == ASKED))
+    other = Limit("1", limits.other_max, source=limits.source_of("other_max"))
     wrong = wrong_axes(found.triad, found.axes)
     made: list[Check] = []
     for i, (name, axis, row) in enumerate(zip(TRIADS[found.triad], found.axes, found.matrix, strict=True)):

@@ -25,7 +25,7 @@ from procedures.core import units
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.site import Site
@@ -243,41 +243,49 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
         return ()
     deviations_ppm = (made.covariance.diagonal() ** 0.5 / units.PPM).tolist()
     sd = dict(zip(coefficient_names(params.terms), deviations_ppm, strict=True))
-    of_scale = Limit("ppm", maximum=params.limits.scale_factor_3_sigma_ppm, source="ours")
+    of_scale = _of_scale(params.limits)
     found: list[PlannedCheck] = []
     for number, axis in enumerate(AXES, start=1):
         three = 3.0 * sd[f"K{number}{number}"]
         found.append(PlannedCheck(f"gyro scale factor {axis}, 3σ", of_scale, None, None, three))
         for term in params.terms:
-            name, maximum = _named(term, params.limits)
-            limit = Limit("ppm", maximum=maximum, source=TERM_SOURCE)
+            name, limit = _named(term, params.limits)
             found.append(PlannedCheck(f"gyro {name} {axis}", limit, sd[f"{term}_{axis}"]))
     level = params.limits.residual_p_value_min
-    limit = Limit("1", minimum=level, source="ours: a test of significance")
+    limit = Limit("1", minimum=level, source=_level_source(params.limits))
     return (*found, PlannedCheck("gyro residuals, p-value of chi-square", limit, level=level))
 
 
-def _named(term: Term, limits: Limits) -> tuple[str, float]:
-    """Name of a term in its check, and its limit [ppm]."""
-    if term == "asymmetry":
-        return "asymmetry", limits.asymmetry_ppm
-    return f"nonlinearity, {term}", limits.nonlinearity_ppm
+def _named(term: Term, limits: Limits) -> tuple[str, Limit]:
+    """Name of a term in its check, and its limit."""
+    name, field = ("asymmetry",) * 2 if term == "asymmetry" else (f"nonlinearity, {term}", "nonlinearity")
+    most = f"{field}_ppm"
+    return name, Limit("ppm", maximum=getattr(limits, most), source=limits.source_of(most, TERM_SOURCE))
+
+
+def _of_scale(limits: Limits) -> Limit:
+    field = "scale_factor_3_sigma_ppm"
+    return Limit("ppm", maximum=limits.scale_factor_3_sigma_ppm, source=limits.source_of(field))
+
+
+def _level_source(limits: Limits) -> str:
+    return limits.source_of("residual_p_value_min", SIGNIFICANCE)
 
 
 def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
     limits, ppm = params.limits, units.PPM
-    of_scale = Limit("ppm", maximum=limits.scale_factor_3_sigma_ppm, source="ours")
+    of_scale = _of_scale(limits)
     checks: list[Check] = []
     for number, axis in enumerate(AXES, start=1):
         k = found.coefficient(f"K{number}{number}")
         checks.append(check(f"gyro scale factor {axis}, 3σ", 3.0 * k.standard_uncertainty / ppm, of_scale))
         for term in params.terms:
-            name, maximum = _named(term, limits)
+            name, limit = _named(term, limits)
             c = found.coefficient(f"{term}_{axis}")
-            limit = Limit("ppm", maximum=maximum, source=TERM_SOURCE)
             checks.append(check(f"gyro {name} {axis}", abs(c.estimate) / ppm, limit, c.standard_uncertainty / ppm))
     if found.p_value is not None:
-        checks.append(significance("gyro residuals, p-value of chi-square", found.p_value, limits.residual_p_value_min))
+        name, level = "gyro residuals, p-value of chi-square", limits.residual_p_value_min
+        checks.append(significance(name, found.p_value, level, source=_level_source(limits)))
     return tuple(checks)
 
 

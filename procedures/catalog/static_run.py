@@ -22,7 +22,7 @@ from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
 from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
-from procedures.noise_limits import THESIS_LIMITS, NoiseLimits, noise_checks
+from procedures.noise_limits import ABSENCE_LEVEL, READY_S, THESIS_LIMITS, NoiseLimits, noise_checks
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -43,13 +43,13 @@ class Limits(NoiseLimits):
         THESIS_LIMITS["accelerometer_bias_in_run_m_s2"], gt=0.0, le=100.0, description="bias instability"
     )
     readiness_s: float | None = Field(
-        600.0,
+        READY_S,
         gt=0.0,
         le=1e6,
         description="since the launch, by which a warm-up that was found has ended; null: no check",
     )
     absence_level: float | None = Field(
-        0.001,
+        ABSENCE_LEVEL,
         gt=0.0,
         le=0.2,
         description="rate random walk and ramp must be absent; chance that a sound unit fails; null: no check",

@@ -27,7 +27,7 @@ from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.frames import upward_axis
-from procedures.core.limits import verdict
+from procedures.core.limits import ASKED, verdict
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
@@ -222,7 +222,9 @@ def _withheld(context: Context) -> tuple[str, ...]:
 
 
 def _limits(params: Params) -> CycleLimits:
-    return CycleLimits(**params.limits.model_dump(), level=params.level)
+    given = [(params.limits, name) for name in type(params.limits).model_fields]
+    sources = {name: ASKED for of, name in (*given, (params, "level")) if of.source_of(name) == ASKED}
+    return CycleLimits(**params.limits.model_dump(), level=params.level, sources=sources)
 
 
 def _up(recording: Recording) -> int:

@@ -14,8 +14,8 @@ from typing import Literal
 
 RuleName = Literal["simple", "guarded"]
 OutcomeName = Literal["pass", "conditional pass", "conditional fail", "fail", "inconclusive"]
-ASKED = "the request"
-"""Source of a limit that a request gave."""
+OURS, SIGNIFICANCE, ASKED = "ours", "ours: a test of significance", "the request"
+"""Sources of limits that no document gives: this program's own, its level of a test, one that a request gave."""
 BOUND_RULE = "an upper bound of what was not observed: it passes within the limit, and decides nothing outside"
 COVERAGE = 0.9545
 """Coverage probability without another wish: k = 2 of a normal distribution."""
@@ -218,14 +218,19 @@ def upper_bound(name: str, bound: float, limit: Limit, reason: str = "not observ
 
 def asked_limit(unit: str, maximum: float, default: float, source: str) -> Limit:
     """Return a largest value with its source: that of the default, unless the request gave another value."""
-    return Limit(unit, maximum=maximum, source=source if maximum == default else ASKED)
+    return Limit(unit, maximum=maximum, source=source_of(maximum, default, source))
+
+
+def source_of(value: object, default: object, source: str) -> str:
+    """Return the source of a limit: that of the default, unless the request gave another value."""
+    return source if value == default else ASKED
 
 
 def significance(name: str, p_value: float, level: float, note: str = "", source: str = "") -> Check:
     """Return the check of a test of significance at a level: it fails where the p-value is below it. Such a value has
     no uncertainty.
     """
-    limit = Limit("1", minimum=level, source=source or "ours: a test of significance")
+    limit = Limit("1", minimum=level, source=source or SIGNIFICANCE)
     return replace(check(name, p_value, limit, note=note), significance=True)
 
 

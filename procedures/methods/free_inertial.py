@@ -26,7 +26,7 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
 from procedures.core.imu_model import TriadCalibration, correct
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import ASKED, SIGNIFICANCE, Check, Limit, check, significance, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
@@ -189,9 +189,17 @@ def _checks(params: Params, track: Track, p_value: float | None, distance: float
     if p_value is not None:
         level = params.p_value_min
         note = f"{distance:.3g} standard deviations"
-        made.append(significance("drift as predicted, p-value of its Mahalanobis distance", p_value, level, note))
+        made.append(
+            significance(
+                "drift as predicted, p-value of its Mahalanobis distance",
+                p_value,
+                level,
+                note,
+                params.source_of("p_value_min", SIGNIFICANCE),
+            )
+        )
     if params.drift_max_m is not None:
-        limit = Limit("m", maximum=params.drift_max_m)
+        limit = Limit("m", maximum=params.drift_max_m, source=ASKED)
         made.append(check("greatest distance from the start", float(track.radial_m.max()), limit))
     return tuple(made)
 

@@ -19,7 +19,7 @@ from procedures.analysis.recursive_bias.kalman import RecursiveBias, white_covar
 from procedures.analysis.recursive_bias.window_noise import WindowMeans
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import ASKED, Check, Limit, check, significance, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
@@ -230,7 +230,7 @@ def _checks(b: ChannelBias, level: float) -> tuple[Check, ...]:
     if b.noise == "record":
         found.append(significance(f"{where}: innovations, p-value", b.innovations_p_value, level))
     if b.target_sd is not None:
-        limit = Limit(name, b.target_sd / size, source="target")
+        limit = Limit(name, b.target_sd / size, source=ASKED)
         found.append(check(f"{where}: standard uncertainty", b.standard_uncertainty / size, limit))
     return tuple(found)
 

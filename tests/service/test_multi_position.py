@@ -16,7 +16,7 @@ from tests.service.client import Client
 def job(sqlite_client: Client) -> dict:
     body = {
         "procedure": "multi_position_calibration",
-        "parameters": {"dwell_s": 10.0, "weighting": "noise"},
+        "parameters": {"dwell_s": 10.0, "weighting": "noise", "residual_p_value_min": 0.0005},
         "seed": 11,
     }
     done = sqlite_client.wait(sqlite_client.submit(**body)["id"])
@@ -37,6 +37,13 @@ def test_the_thesis_program_gives_fourteen_recordings_and_both_triads(sqlite_cli
         assert triad["condition"] < 1.5
         assert all(math.isfinite(c["standard_uncertainty"]) for c in triad["coefficients"])
     assert job["verdict"] == "pass", found["checks"]
+
+
+def test_each_limit_names_its_source(sqlite_client: Client, job: dict) -> None:
+    sources = {c["name"]: c["limit"]["source"] for c in document(sqlite_client, job)["checks"]}
+    assert sources["gyro residuals, p-value of chi-square"] == "the request"
+    assert sources["gyro condition number"] == "ours"
+    assert "" not in sources.values()
 
 
 def test_the_method_gives_the_procedures_numbers_from_its_recordings(sqlite_client: Client, job: dict) -> None:
