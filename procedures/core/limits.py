@@ -149,7 +149,8 @@ class Check:
     """Check of one value against one limit: passed or not, with its uncertainty and the decision."""
 
     name: str
-    value: float
+    value: float | None
+    """Value in the limit's unit; None: an upper bound that is infinite, as nothing bounds what was not observed."""
     limit: Limit
     passed: bool
     standard_uncertainty: float | None = None
@@ -161,7 +162,7 @@ class Check:
     significance: bool = False
     """True for a test of significance: the value is a p-value and the limit its level."""
     bound: bool = False
-    """True: nothing was observed, and the value is what it stays below."""
+    """True: nothing was observed, and the value is what it stays below; a value of None: it is unbounded."""
 
     @property
     def inconclusive(self) -> bool:
@@ -201,19 +202,21 @@ def check(
 ) -> Check:
     """Return the check of a value against its limit by simple acceptance. A value that is not finite never passes.
 
-    `bound`: nothing was observed, and the value is what it stays below.
+    `bound`: nothing was observed, and the value is what it stays below; one of infinity becomes None, unbounded.
     """
     passed = (
         isfinite(value)
         and (limit.maximum is None or value <= limit.maximum)
         and (limit.minimum is None or value >= limit.minimum)
     )
-    return Check(name, value, limit, passed, standard_uncertainty, note, degrees_of_freedom, bound=bound)
+    held = None if bound and value == inf else value
+    return Check(name, held, limit, passed, standard_uncertainty, note, degrees_of_freedom, bound=bound)
 
 
 def upper_bound(name: str, bound: float, limit: Limit, reason: str = "not observed") -> Check:
-    """Return the check of what was not observed, by the value that it stays below."""
-    return check(name, bound, limit, note=f"{reason}: the value is what it stays below", bound=True)
+    """Return the check of what was not observed, by the value that it stays below; infinity: unbounded."""
+    told = "unbounded, nothing limits it from above" if bound == inf else "the value is what it stays below"
+    return check(name, bound, limit, note=f"{reason}: {told}", bound=True)
 
 
 def asked_limit(unit: str, maximum: float, default: float, source: str) -> Limit:
@@ -241,7 +244,7 @@ def decided(made: Check, rule: Rule) -> Check:
     if made.significance:
         outcome = "pass" if made.passed else "fail"
         return replace(made, decision=Decision(f"test of significance at {made.limit.minimum or 0.0:g}", outcome))
-    distance = inside(made.value, made.limit.minimum, made.limit.maximum)
+    distance = -inf if made.value is None else inside(made.value, made.limit.minimum, made.limit.maximum)
     found = decide(distance, made.passed, made.standard_uncertainty, made.degrees_of_freedom, rule)
     return replace(made, passed=found.outcome.endswith("pass"), decision=found)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 
@@ -99,5 +100,5 @@ def _noise(name: str, noises: list[GyroNoise], process: int, limits: CycleLimits
     seen = [v for v in values if v is not None]
     if seen:
         return check(name, float(np.mean(seen)) / size, limit, note=f"seen in {len(seen)} of {len(values)} runs")
-    bound = min(g.upper_limits[process] for g in noises)
-    return upper_bound(name, bound / size, limit)
+    bounds = [most for g in noises if (most := g.upper_limits[process]) is not None]
+    return upper_bound(name, min(bounds, default=inf) / size, limit)
