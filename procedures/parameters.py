@@ -58,6 +58,18 @@ class JudgedParameters(Parameters):
     )
 
 
+class SupplyParameters(Parameters):
+    """The voltage of the unit's supply, of procedures that test a unit at other voltages than the nominal one."""
+
+    supply_voltage_v: float | None = Field(
+        None,
+        gt=0.0,
+        le=1000.0,
+        exclude_if=lambda voltage: voltage is None,
+        description="of the unit's supply, set before the unit is switched on; None: the bench's nominal voltage",
+    )
+
+
 Second = Annotated[float, Field(ge=0.0, le=1e9)]
 
 

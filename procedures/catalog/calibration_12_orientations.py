@@ -46,6 +46,7 @@ from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.dwells import DwellParameters, expected_stations, saved_tables
 from procedures.multi_position import in_run_limit, predicted, triad_checks
+from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.site_parameters import TableParameters, declared_table
@@ -77,7 +78,7 @@ class Limits(Parameters):
     )
 
 
-class Params(TableParameters, DwellParameters):
+class Params(TableParameters, DwellParameters, SupplyParameters):
     """Orientations, dwell, site and limits of the calibration. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle], ...] = Field(
@@ -143,6 +144,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.dwell_s,
             temperatures=params.thermal_correction == "current",
             until=params.until,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i, (beta, gamma) in enumerate(params.orientations)
     )

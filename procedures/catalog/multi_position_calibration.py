@@ -21,6 +21,7 @@ from procedures.core.recording import Recording, Station
 from procedures.core.table_angles import TableAngles
 from procedures.dwells import DwellParameters, expected_stations
 from procedures.multi_position import FitParameters, Inputs, Result
+from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, Prediction, Procedure
 from procedures.site_parameters import TableParameters, declared_table
 
@@ -29,7 +30,7 @@ FOURTEEN = tuple(position[:3] for position in THESIS_POSITIONS[1:-1])
 """The rests of the thesis's program (appendix Д) without the home position at its beginning and end."""
 
 
-class Params(FitParameters, TableParameters, DwellParameters):
+class Params(FitParameters, TableParameters, DwellParameters, SupplyParameters):
     """Positions, dwell, site and fit; None takes the unit's or the bench's value, or the thesis's positions."""
 
     positions: tuple[tuple[Angle, Angle, Angle], ...] | None = Field(
@@ -80,6 +81,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.settle_s,
             dwell_s,
             until=params.until,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i, (a, dwell_s) in enumerate(rests)
     )

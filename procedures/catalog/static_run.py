@@ -23,6 +23,7 @@ from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
 from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
 from procedures.noise_limits import ABSENCE_LEVEL, READY_S, THESIS_LIMITS, NoiseLimits, noise_checks
+from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -56,7 +57,7 @@ class Limits(NoiseLimits):
     )
 
 
-class Params(NoiseParameters):
+class Params(NoiseParameters, SupplyParameters):
     """Number and duration of the launches, and settings of their analysis."""
 
     noise_limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -99,6 +100,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             power_off_s=params.off_time_s,
             temperatures=params.temperatures,
             sample_rate_hz=params.sample_rate_hz,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i in range(params.launches)
     )

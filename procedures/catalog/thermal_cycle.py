@@ -33,6 +33,7 @@ from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.thermal_correction import Form
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
+from procedures.parameters import SupplyParameters
 from procedures.procedure import STATIONS, Context, JudgedParameters, Outcome, Prediction, Procedure
 from procedures.reports import thermal_figures, thermal_tables
 from procedures.thermal_parameters import DEFAULT_LEGS, Leg, Limits, Regime, Soak
@@ -41,7 +42,7 @@ LEAST_OFF_S = 3.0 * units.HOUR
 """Least time switched off between runs, three hours (thesis 4.2.1)."""
 
 
-class Params(JudgedParameters):
+class Params(JudgedParameters, SupplyParameters):
     """Profile, analysis and limits of the cycle."""
 
     legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)
@@ -133,6 +134,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             temperatures=True,
             sample_rate_hz=params.sample_rate_hz,
             profile=profile,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i, axis in enumerate(AXES)
     )

@@ -48,6 +48,7 @@ from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.dwells import DwellParameters, expected_stations, saved_tables
 from procedures.multi_position import in_run_limit
+from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.reports import diagnosis as diagnoses
@@ -77,7 +78,7 @@ class Limits(Parameters):
     )
 
 
-class Params(TableParameters, DwellParameters):
+class Params(TableParameters, DwellParameters, SupplyParameters):
     """Orientations of the verification and limits of the unit. None takes the unit's or the bench's value.
 
     The accuracy of table and azimuth concerns the diagnosis alone; the magnitudes do not depend on it.
@@ -126,6 +127,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.dwell_s,
             temperatures=params.thermal_correction == "current",
             until=params.until,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i, (inner, middle, outer) in enumerate(params.orientations)
     )
