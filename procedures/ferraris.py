@@ -12,12 +12,12 @@ from procedures.analysis.turns.ferraris import analyse_ferraris, rest_means
 from procedures.analysis.turns.summary import WholeTurns
 from procedures.core import units
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significance, verdict
-from procedures.core.recording import AXES, Recording
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.recording import AXES, TRIADS, Recording
 from procedures.core.report import Report
 from procedures.core.site import Site
 from procedures.core.unit import Unit
-from procedures.parameters import Parameters
+from procedures.parameters import Parameters, planned_tests
 from procedures.procedure import Outcome
 from procedures.reports import calibration as pictures
 from procedures.reports import whole_turns as of_turns
@@ -90,6 +90,12 @@ def report(result: Result) -> Report:
 
 
 RESIDUALS = "residuals, p-value of chi-square"
+
+
+def planned_residuals(limits: FerrarisLimits, unit: Unit) -> tuple[PlannedCheck, ...]:
+    """Return the planned tests of the residuals of triads whose noise is known."""
+    known = [triad for triad in TRIADS if unit.triad(triad) is not None]
+    return planned_tests(limits, "residual_p_value_min", *(f"{triad} {RESIDUALS}" for triad in known))
 
 
 def _gyro_checks(found: WholeTurns, limits: FerrarisLimits) -> list[Check]:

@@ -13,7 +13,6 @@ from pydantic import Field
 
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.extra_terms import ExtraFit, Kind, TermEstimate, fit_terms, require_terms, terms_of
-from procedures.analysis.calibration.misfit import MISFIT_MAX
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
@@ -22,23 +21,22 @@ from procedures.analysis.calibration.station_means import StationMeans, launch_w
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.calibration.triad_analysis import analyse_inputs, brought_by_unit, noise_of_means, suspected
-from procedures.analysis.orientation_plan.requirements import IN_RUN_SOURCE
-from procedures.analysis.own_axes import OWN_AXES, own_axis_check
+from procedures.analysis.own_axes import OWN_AXES
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
-from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, triad_calibration
-from procedures.core.limits import OURS, SIGNIFICANCE, Check, Limit, check, significance, verdict
+from procedures.core.limits import Check, PlannedCheck, verdict
 from procedures.core.recording import Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
 from procedures.dwells import saved_tables
-from procedures.parameters import JudgedParameters, Parameters
+from procedures.parameters import JudgedParameters, planned_tests
 from procedures.procedure import Outcome, PredictedUncertainty
 from procedures.reports import calibration as pictures
+from procedures.triad_checks import RESIDUALS, fit_checks
 
 TriadName = Literal["accelerometer", "gyro"]
 ACCELEROMETER_TERMS: tuple[Kind, ...] = ("quadratic", "asymmetry")
@@ -200,8 +198,15 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 
 def quantities(params: FitParameters) -> tuple[str, ...]:
     """Return the names of the checks and coefficients that a result will have."""
-    checks = (" condition number", OWN_AXES, " residuals, p-value of chi-square")
+    checks = (" condition number", OWN_AXES, f" {RESIDUALS}")
     return tuple(f"{triad}{n}" for triad in params.triads for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
+
+
+def planned_residuals(params: FitParameters, triads: Sequence[str]) -> tuple[PlannedCheck, ...]:
+    """Return the planned tests of the residuals of triads whose noise is known."""
+    return planned_tests(
+        params, "residual_p_value_min", *(f"{triad} residuals, p-value of chi-square" for triad in triads)
+    )
 
 
 def report(result: Result) -> Report:
@@ -229,50 +234,11 @@ def _of(extended: Sequence[Extended], summary: TriadSummary) -> Extended | None:
     return next((e for e in extended if e.calibration.triad == summary.calibration.triad), None)
 
 
-def in_run_limit(triad: str, limits: Parameters) -> Limit:
-    """Return the limit on a triad's error per axis with its source; no maximum where `limits` has none."""
-    field, unit = {"gyro": ("gyro_bias_in_run_deg_h", "deg/h")}.get(triad, ("accelerometer_bias_in_run_m_s2", "m/s^2"))
-    return Limit(unit, maximum=getattr(limits, field), source=limits.source_of(field, IN_RUN_SOURCE))
-
-
-def triad_checks(t: TriadSummary, in_run: Limit, limits: Parameters) -> list[Check]:
-    """Return the checks of a triad's calibration: error per axis in sample, condition, and residuals by p-value or
-    misfit. `limits` has `condition_max` and `residual_p_value_min`.
-    """
-    name, m = f"{t.calibration.triad} bias in run, δ/√3", t.magnitudes
-    size, freedom = units.DISPLAY[m.unit][1], len(m.after) - 1.0
-    in_sample = check(name, m.per_axis / size, in_run, m.per_axis_sd / size, degrees_of_freedom=freedom)
-    of_fit = (t.condition, t.calibration.matrix_array, t.p_value, t.misfit)
-    return [in_sample, *_fit_checks(t, *of_fit, limits, "noise and table")]
-
-
 def _checks(t: TriadSummary, extended: Extended | None, params: FitParameters) -> list[Check]:
     of = extended or t
     misfit = t.misfit if extended is None else None
     of_fit = (of.condition, of.calibration.matrix_array, of.p_value, misfit)
-    return _fit_checks(t, *of_fit, params, "noise and positions")
-
-
-def _fit_checks(
-    t: TriadSummary,
-    condition: float,
-    matrix: Array,
-    p_value: float | None,
-    misfit: float | None,
-    limits: Parameters,
-    allowing: str,
-) -> list[Check]:
-    """Checks of condition, own axes, and residuals by p-value or misfit."""
-    triad, most, level = t.calibration.triad, "condition_max", "residual_p_value_min"
-    limit = Limit("1", maximum=getattr(limits, most), source=limits.source_of(most))
-    checks = [check(f"{triad} condition number", condition, limit), own_axis_check(triad, matrix)]
-    if p_value is not None:
-        name, source = f"{triad} residuals, p-value of chi-square", limits.source_of(level, SIGNIFICANCE)
-        checks.append(significance(name, p_value, getattr(limits, level), t.residual_note, source))
-    elif misfit is not None:
-        limit = Limit("1", maximum=MISFIT_MAX, source=OURS)
-        checks.append(check(f"{triad} residuals over what {allowing} allow", misfit, limit, note=f"worst: {t.worst}"))
-    return checks
+    return fit_checks(t, *of_fit, params, "noise and positions")
 
 
 def _unknown_noise(summaries: Sequence[TriadSummary]) -> tuple[str, ...]:

@@ -45,11 +45,12 @@ from procedures.core.limits import SIGNIFICANCE, Limit, PlannedCheck, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.dwells import DwellParameters, expected_stations, saved_tables
-from procedures.multi_position import in_run_limit, predicted, triad_checks
+from procedures.multi_position import predicted
 from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.site_parameters import TableParameters, declared_table
+from procedures.triad_checks import in_run_limit, triad_checks
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]

@@ -17,11 +17,12 @@ from procedures.analysis.table_program.writing import THESIS_POSITIONS
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
+from procedures.core.limits import PlannedCheck
 from procedures.core.recording import Recording, Station
 from procedures.core.table_angles import TableAngles
 from procedures.dwells import DwellParameters, expected_stations
 from procedures.multi_position import FitParameters, Inputs, Result
-from procedures.parameters import SupplyParameters
+from procedures.parameters import SupplyParameters, largest
 from procedures.procedure import Context, Prediction, Procedure
 from procedures.site_parameters import TableParameters, declared_table
 
@@ -128,6 +129,15 @@ def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
     )
 
 
+def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
+    """Return the planned checks of each triad: its design's condition number, and its residuals."""
+    params = resolve(params, context)
+    limit = largest(params, "condition_max", "1")
+    conditions = [PlannedCheck(f"{triad} condition number", limit) for triad in params.triads]
+    known = [triad for triad in params.triads if context.unit.triad(triad) is not None]
+    return (*conditions, *multi_position.planned_residuals(params, known))
+
+
 PROCEDURE = Procedure(
     "multi_position_calibration",
     "Calibration in any positions",
@@ -142,4 +152,5 @@ PROCEDURE = Procedure(
     multi_position.report,
     multi_position.calibrations,
     quantities=lambda params, _: multi_position.quantities(params),
+    planned_checks=planned_checks,
 )

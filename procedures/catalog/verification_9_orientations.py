@@ -47,12 +47,12 @@ from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.dwells import DwellParameters, expected_stations, saved_tables
-from procedures.multi_position import in_run_limit
 from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.reports import diagnosis as diagnoses
 from procedures.site_parameters import TableParameters, declared_table
+from procedures.triad_checks import in_run_limit
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]

@@ -30,6 +30,7 @@ from procedures.core.limits import ASKED, SIGNIFICANCE, Check, Limit, check, sig
 from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
+from procedures.parameters import planned_tests
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
 
 NAMES = ("gyro", "accelerometer")
@@ -184,6 +185,9 @@ def _at(time_s: Array, track: Track, values: Array) -> tuple[float, ...]:
     return tuple(np.interp(time_s, track.time_s, values).tolist())
 
 
+DRIFT = "drift as predicted, p-value of its Mahalanobis distance"
+
+
 def _checks(params: Params, track: Track, p_value: float | None, distance: float) -> tuple[Check, ...]:
     made: list[Check] = []
     if p_value is not None:
@@ -191,7 +195,7 @@ def _checks(params: Params, track: Track, p_value: float | None, distance: float
         note = f"{distance:.3g} standard deviations"
         made.append(
             significance(
-                "drift as predicted, p-value of its Mahalanobis distance",
+                DRIFT,
                 p_value,
                 level,
                 note,
@@ -259,5 +263,6 @@ METHOD = Method(
     Result,
     analyse,
     report,
+    planned_checks=lambda params, _unit, _planned: planned_tests(params, "p_value_min", DRIFT),
     inspection=lambda _params, _count: Inspection(FitnessSettings(least_samples=1), GYRO + ACCELEROMETER),
 )

@@ -23,6 +23,7 @@ from procedures.core.limits import ASKED, Check, Limit, check, significance, ver
 from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
+from procedures.parameters import planned_tests
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
 
 
@@ -258,6 +259,9 @@ def inspection(params: Params, count: int) -> Inspection:
     return Inspection(FitnessSettings(least_samples=1, counters_may_rest=True), params.channels or GYRO + ACCELEROMETER)
 
 
+TESTS = "innovations and scatter of all channels, smallest p-value"
+"""Name of the planned test; its level is shared among the channels, which are known with the recordings."""
+
 METHOD = Method(
     "kalman_calibration",
     "Kalman calibration of a constant bias",
@@ -266,5 +270,6 @@ METHOD = Method(
     Result,
     analyse,
     report,
+    planned_checks=lambda params, _unit, _planned: planned_tests(params, "level", TESTS),
     inspection=inspection,
 )

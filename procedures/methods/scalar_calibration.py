@@ -32,6 +32,7 @@ from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significan
 from procedures.core.recording import TRIADS, Recording, rates, require_finite
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
+from procedures.parameters import planned_tests
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, Parameters, RecordedParameters
 
 TURNED = replace(STATIONS.settings, at_rest=False, beside_others=False)
@@ -221,6 +222,9 @@ def _result(fit: ScalarFit, params: Params, poses: Poses) -> Result:
     )
 
 
+RESIDUALS = "residuals, p-value of chi-square"
+
+
 def _checks(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[Check, ...]:
     relative = _relative_sd(fit, params)
     checks = [
@@ -239,7 +243,7 @@ def _checks(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[Check, ...]
     if fit.p_value is not None:
         note = f"worst: {misfit.worst}"
         level, source = params.residual_p_value_min, params.source_of("residual_p_value_min", SIGNIFICANCE)
-        checks.append(significance("residuals, p-value of chi-square", fit.p_value, level, note, source))
+        checks.append(significance(RESIDUALS, fit.p_value, level, note, source))
     elif not fit.noise_known:
         checks += misfit.checks(
             "residuals over the scatter within the poses", params.misfit_max, params.source_of("misfit_max")
@@ -282,5 +286,6 @@ METHOD = Method(
     analyse,
     report,
     calibrations,
+    planned_checks=lambda params, _unit, _planned: planned_tests(params, "residual_p_value_min", RESIDUALS),
     inspection=inspection,
 )

@@ -72,6 +72,11 @@ def test_the_order_is_chosen_where_enough_soaks_are_left(result: Result):
             assert len(part.coefficients) == 1 + int(np.argmin(bic)) > 1, "the truth is a square"
 
 
+def test_the_limits_are_known_beforehand(result: Result):
+    planned = [(one.check, one.limit) for one in PROCEDURE.planned_checks(Params.model_validate(SHORT), CONTEXT)]
+    assert planned == [(c.name, c.limit) for c in result.checks]
+
+
 def test_the_models_are_the_truth_within_their_uncertainties(result: Result):
     offset = UNIT.thermal.thermometers[1].offset_c
     for channel, truth in zip(result.channels, UNIT.thermal.converter, strict=True):

@@ -63,6 +63,11 @@ def test_a_sound_unit_passes_and_its_result_survives_storage(result: Result):
     assert result.cycle.force_known
 
 
+def test_the_limits_are_known_beforehand(result: Result, known: Context):
+    planned = {one.check: one.limit for one in thermal_cycle.PROCEDURE.planned_checks(PARAMS, known)}
+    assert planned == {c.name: c.limit for c in result.checks}
+
+
 def test_a_limit_that_was_given_has_the_request_for_its_source(result: Result):
     """The same cycle is held to other limits; the thesis stands beside its own numbers alone."""
     limits = thermal_cycle.Limits(three_sigma_m_s2=0.001, gyro_bias_in_run_deg_h=0.02)

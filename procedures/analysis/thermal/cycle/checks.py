@@ -88,14 +88,25 @@ def planned_cycle_checks(limits: CycleLimits) -> tuple[PlannedCheck, ...]:
     gyros = [
         PlannedCheck(f"gyro_{axis} independence of temperature, p-value", independent, level=level) for axis in AXES
     ]
-    return (*of_axes, PlannedCheck("|ĝ| over the cycle, rms about its mean", rms), *gyros)
+    rise = Limit("1", maximum=limits.allan_rise, source=limits.source("allan_rise"))
+    rises = [PlannedCheck(f"accelerometer_{axis} rise of the Allan deviation", rise) for axis in AXES]
+    noise = [
+        PlannedCheck(f"gyro_{axis} {name} in the cycle", _noise_limit(process, limits))
+        for axis in AXES
+        for name, process in (("random walk", 1), ("bias instability", 2))
+    ]
+    return (*of_axes, PlannedCheck("|ĝ| over the cycle, rms about its mean", rms), *rises, *gyros, *noise)
+
+
+def _noise_limit(process: int, limits: CycleLimits) -> Limit:
+    """Limit of random walk (1) or bias instability (2)."""
+    unit, of = (("", ""), ("deg/√h", "gyro_random_walk_deg_sqrt_h"), ("deg/h", "gyro_bias_in_run_deg_h"))[process]
+    return Limit(unit, maximum=getattr(limits, of), source=limits.source(of))
 
 
 def _noise(name: str, noises: list[GyroNoise], process: int, limits: CycleLimits) -> Check:
     """The mean over the runs that show it; where none does, the least that it is known to stay below."""
-    unit, size = (("arcsec", units.ARCSEC), ("deg/√h", units.DEG_PER_SQRT_HOUR), ("deg/h", units.DEG_PER_HOUR))[process]
-    field_name = ("", "gyro_random_walk_deg_sqrt_h", "gyro_bias_in_run_deg_h")[process]
-    limit = Limit(unit, maximum=getattr(limits, field_name), source=limits.source(field_name))
+    limit, size = _noise_limit(process, limits), (units.ARCSEC, units.DEG_PER_SQRT_HOUR, units.DEG_PER_HOUR)[process]
     values = [(g.quantization, g.random_walk, g.bias_instability)[process] for g in noises]
     seen = [v for v in values if v is not None]
     if seen:
