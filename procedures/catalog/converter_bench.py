@@ -290,6 +290,7 @@ PROCEDURE = Procedure(
     analyse,
     report,
     corrections=corrections,
+    quantities=lambda params, context: tuple(one.check for one in planned_checks(params, context)),
     planned_checks=planned_checks,
     inspection=lambda _: replace(STATIONS, temperatures=True),
 )

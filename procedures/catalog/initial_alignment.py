@@ -245,5 +245,6 @@ PROCEDURE = Procedure(
     analyse,
     report,
     uses_calibration=TRIAD_NAMES,
+    quantities=lambda _params, _context: (HEADING, *(f"{angle} {AS_PREDICTED}" for angle in ANGLES)),
     planned_checks=planned_checks,
 )

@@ -29,6 +29,7 @@ from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, che
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.site import Site
+from procedures.parameters import largest, planned_tests
 from procedures.procedure import (
     Context,
     JudgedParameters,
@@ -45,6 +46,7 @@ from procedures.table_motion import default_ramp_s, require_possible, require_re
 
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
 TERM_SOURCE = "ours, after thesis 4.3"
+RESIDUALS = "gyro residuals, p-value of chi-square"
 REST_S = 2.0
 """Rest at the end of a recording where the table's demands take no time [s]."""
 
@@ -243,7 +245,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
         return ()
     deviations_ppm = (made.covariance.diagonal() ** 0.5 / units.PPM).tolist()
     sd = dict(zip(coefficient_names(params.terms), deviations_ppm, strict=True))
-    of_scale = _of_scale(params.limits)
+    of_scale = largest(params.limits, "scale_factor_3_sigma_ppm", "ppm")
     found: list[PlannedCheck] = []
     for number, axis in enumerate(AXES, start=1):
         three = 3.0 * sd[f"K{number}{number}"]
@@ -251,30 +253,19 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
         for term in params.terms:
             name, limit = _named(term, params.limits)
             found.append(PlannedCheck(f"gyro {name} {axis}", limit, sd[f"{term}_{axis}"]))
-    level = params.limits.residual_p_value_min
-    limit = Limit("1", minimum=level, source=_level_source(params.limits))
-    return (*found, PlannedCheck("gyro residuals, p-value of chi-square", limit, level=level))
+    return (*found, *planned_tests(params.limits, "residual_p_value_min", RESIDUALS))
 
 
 def _named(term: Term, limits: Limits) -> tuple[str, Limit]:
     """Name of a term in its check, and its limit."""
     name, field = ("asymmetry",) * 2 if term == "asymmetry" else (f"nonlinearity, {term}", "nonlinearity")
     most = f"{field}_ppm"
-    return name, Limit("ppm", maximum=getattr(limits, most), source=limits.source_of(most, TERM_SOURCE))
-
-
-def _of_scale(limits: Limits) -> Limit:
-    field = "scale_factor_3_sigma_ppm"
-    return Limit("ppm", maximum=limits.scale_factor_3_sigma_ppm, source=limits.source_of(field))
-
-
-def _level_source(limits: Limits) -> str:
-    return limits.source_of("residual_p_value_min", SIGNIFICANCE)
+    return name, largest(limits, most, "ppm", TERM_SOURCE)
 
 
 def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
     limits, ppm = params.limits, units.PPM
-    of_scale = _of_scale(limits)
+    of_scale = largest(limits, "scale_factor_3_sigma_ppm", "ppm")
     checks: list[Check] = []
     for number, axis in enumerate(AXES, start=1):
         k = found.coefficient(f"K{number}{number}")
@@ -284,13 +275,21 @@ def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
             c = found.coefficient(f"{term}_{axis}")
             checks.append(check(f"gyro {name} {axis}", abs(c.estimate) / ppm, limit, c.standard_uncertainty / ppm))
     if found.p_value is not None:
-        name, level = "gyro residuals, p-value of chi-square", limits.residual_p_value_min
-        checks.append(significance(name, found.p_value, level, source=_level_source(limits)))
+        level, source = limits.residual_p_value_min, limits.source_of("residual_p_value_min", SIGNIFICANCE)
+        checks.append(significance(RESIDUALS, found.p_value, level, source=source))
     return tuple(checks)
+
+
+def quantities(params: Params, _context: Context) -> tuple[str, ...]:
+    """Return the names of the checks and coefficients that a result will have."""
+    terms = (_named(term, params.limits)[0] + " {}" for term in params.terms)
+    checks = (f"gyro {name.format(axis)}" for name in ("scale factor {}, 3σ", *terms) for axis in AXES)
+    return (*checks, RESIDUALS, *(f"gyro.{name}" for name in coefficient_names(params.terms)))
 
 
 PROCEDURE = Procedure(
     *("scale_factor_whole_turns", "Gyro scale factor by whole turns", "1.2.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
+    quantities=quantities,
     planned_checks=planned_checks,
 )

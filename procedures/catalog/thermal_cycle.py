@@ -287,6 +287,7 @@ PROCEDURE = Procedure(
     uses_calibration=("accelerometer",),
     corrections=corrections,
     uses_corrections=uses_corrections,
+    quantities=lambda params, _: tuple(one.check for one in planned_cycle_checks(_limits(params))),
     planned_checks=lambda params, _: planned_cycle_checks(_limits(params)),
     inspection=lambda _: replace(STATIONS, temperatures=True),
 )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
+from bench_service.model.quantities import quantities
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, DeviceFault, SoakNotReached
 from procedures.catalog.converter_bench import PROCEDURE, Params, Result
@@ -75,6 +76,11 @@ def test_the_order_is_chosen_where_enough_soaks_are_left(result: Result):
 def test_the_limits_are_known_beforehand(result: Result):
     planned = [(one.check, one.limit) for one in PROCEDURE.planned_checks(Params.model_validate(SHORT), CONTEXT)]
     assert planned == [(c.name, c.limit) for c in result.checks]
+    promised = PROCEDURE.quantities
+    assert promised is not None
+    assert set(promised(Params.model_validate(SHORT), CONTEXT)) == set(quantities(result.model_dump(mode="json"))), (
+        "every name, and no other"
+    )
 
 
 def test_the_models_are_the_truth_within_their_uncertainties(result: Result):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench_service.model.quantities import quantities
 from procedures.analysis.thermal.cycle.checks import cycle_checks
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
 from procedures.catalog import thermal_cycle
@@ -66,6 +67,9 @@ def test_a_sound_unit_passes_and_its_result_survives_storage(result: Result):
 def test_the_limits_are_known_beforehand(result: Result, known: Context):
     planned = {one.check: one.limit for one in thermal_cycle.PROCEDURE.planned_checks(PARAMS, known)}
     assert planned == {c.name: c.limit for c in result.checks}
+    promised = thermal_cycle.PROCEDURE.quantities
+    assert promised is not None
+    assert set(promised(PARAMS, known)) == set(quantities(result.model_dump(mode="json"))), "every name, and no other"
 
 
 def test_a_limit_that_was_given_has_the_request_for_its_source(result: Result):

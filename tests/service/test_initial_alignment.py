@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from bench_service.cli.asking.client import connect
+from bench_service.model.quantities import quantities
 from bench_service.settings import Settings
 from simulators.truth import default_bench, save_bench
 from tests.kit.registered import register_bench
@@ -60,6 +61,10 @@ def test_every_alignment_is_a_launch_and_errs_as_predicted(
     assert found[1]["attitude_deg"][2] == pytest.approx(-8.0, abs=0.01)
     names = [c["name"] for c in result["document"]["checks"]]
     assert len(names) == 4
+    assert set(quantities(result["document"])) == set(names)
+    wrong = {"quantity": "heading", "unit": "deg", "maximum": 1.0, "source": "ours"}
+    bad = named("bad", {"procedure": "initial_alignment", "parameters": PLAN, "limits": [wrong]})
+    assert "heading, expected standard uncertainty" in sqlite_client.http.post("/api/v1/campaigns", json=bad).text
     step = {"procedure": "initial_alignment", "parameters": PLAN}
     add(sqlite_client, named("aligned", step, decision={"false_alarm": 0.003}))
     foreseen = sqlite_client.http.post("/api/v1/campaigns/aligned/preview", json={"unit": "SIM-0001"})
