@@ -18,7 +18,7 @@ UNREAL = ("mixed", "simulated", "synthetic")
 
 @dataclass(frozen=True)
 class OwnExport:
-    """What an exported file of this service says of itself."""
+    """Statements of an exported file of this service about itself."""
 
     facts: Mapping[str, str]
     channels: tuple[dict[str, Any], ...] = ()

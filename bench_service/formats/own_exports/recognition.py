@@ -26,7 +26,7 @@ _SAID = ("quantity", "unit", "scale", "offset")
 
 @dataclass(frozen=True)
 class Provenance:
-    """What the files of an import say of their origin, whatever a person's description says."""
+    """Statements of an import's files about their origin, which count more than a person's description."""
 
     simulated: bool
     origin: str | None
@@ -36,7 +36,7 @@ class Provenance:
 
 
 def provenance(opened: Sequence[Opened]) -> Provenance:
-    """Return what files say of their origin, by their metadata or their names. Stated warnings are for people."""
+    """Return what files say of their origin, by their metadata or their names."""
     simulated, origin = False, None
     exports: list[dict[str, Any]] = []
     warnings: list[str] = []
@@ -98,7 +98,7 @@ def _columnar(stream: BinaryIO) -> OwnExport | None:
 
 
 def _text(stream: BinaryIO, name: str) -> OwnExport | None:
-    """What lines of comment at the beginning of a text say, plain, packed, or in UTF-16."""
+    """Statements of the comments that begin a text, plain, packed, or in UTF-16."""
     source = TextSource(stream, name, Bounds().unpacked_bytes)
     source.fill(LINE_BYTES)
     facts: dict[str, str] = {}
