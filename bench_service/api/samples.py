@@ -52,7 +52,12 @@ class Values(StrEnum):
 FileForm = Annotated[SheetFormat, Query(alias="format", description="feather is Arrow's file, arrow its stream")]
 Wanted = Annotated[Values, Query(description="physical: SI, increments over the sample period; raw: as stored")]
 CorrectedBy = Annotated[
-    str | None, Query(max_length=300, description="Ids of calibrations, separated by commas, at most one a triad")
+    str | None,
+    Query(
+        max_length=300,
+        description="Ids of calibrations, at most one a triad, and of temperature corrections, at most one of each "
+        "kind, which come first; separated by commas",
+    ),
 ]
 Decimate = Annotated[int, Query(ge=1, le=LARGEST_FACTOR, description="Samples that one mean is taken over")]
 
@@ -129,7 +134,7 @@ async def read_samples_of_job(
 
 def _stem(part: Extract, values: Values, treatment: Treatment) -> str:
     """Name of a file of samples without its ending, which tells how they were treated."""
-    how = [values.value, *(["corrected"] if treatment.calibrations else [])]
+    how = [values.value, *(["corrected"] if treatment.calibrations or treatment.corrections else [])]
     return file_stem(part, *how, *([f"means{treatment.decimate}"] if treatment.decimate > 1 else []))
 
 

@@ -36,7 +36,9 @@ def export(
             "format, but physical with --corrected-by or --decimate, and in .mcap, which holds nothing else"
         ),
     ] = None,
-    corrected_by: Annotated[str | None, typer.Option(help="Calibrations that correct, ids separated by commas")] = None,
+    corrected_by: Annotated[
+        str | None, typer.Option(help="Calibrations and temperature corrections, ids separated by commas")
+    ] = None,
     decimate: Annotated[int | None, typer.Option(min=1, help="Samples that one mean is taken over")] = None,
     form: Annotated[str, typer.Option("--format", help="Format of the files in a .zip")] = "csv",
     server: Server = None,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-from bench_service.formats.samples_out.sheet import CALIBRATION, CORRECTION
+from bench_service.formats.samples_out.sheet import CALIBRATION, CORRECTION, TEMPERATURE
 
 MARKS = ("recording", "unit", "rate_hz", "simulated", "content_hash_of_whole_recording")
 """Facts by which an export of this service is recognised."""
@@ -49,7 +49,7 @@ class OwnExport:
     @property
     def kept(self) -> dict[str, str]:
         """Facts that stay with what is imported, with the corrections and their formulas."""
-        more = [k for k in self.facts if k.startswith((CALIBRATION, CORRECTION))]
+        more = [k for k in self.facts if k.startswith((CALIBRATION, CORRECTION, TEMPERATURE))]
         return {k: self.facts[k] for k in (*KEPT, *more) if k in self.facts}
 
     def description(self) -> dict[str, Any]:
@@ -74,6 +74,11 @@ class OwnExport:
             f"the {triad}s are corrected by calibration {known}: what comes of them is no output of the unit as it is, "
             "and a calibration of it would correct twice"
             for triad, known in self.corrected_by.items()
+        ]
+        warmth = {k.removeprefix(TEMPERATURE): v for k, v in self.facts.items() if k.startswith(TEMPERATURE)}
+        found += [
+            f"corrected for temperature by {known} ({kind}): what comes of it is no output of the unit as it is"
+            for kind, known in warmth.items()
         ]
         if self.decimated_by > 1:
             found.append(f"each row is the mean of {self.decimated_by} samples: its noise is not that of the unit")

@@ -4,7 +4,7 @@ Raw samples are those stored. Physical ones are in SI, increments divided by the
 calibrations ``v = K⁻¹·(U − b)`` and decimated by means; then a unit is part of a column's name too.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +12,18 @@ import numpy as np
 from bench_service.formats.chunk import sample_type
 from bench_service.formats.export import Extract, describe
 from bench_service.formats.samples_out.distinct_names import distinct
+from bench_service.formats.samples_out.temperature import (
+    SENSORS_AS_READ,
+    Stage,
+    corrected_channels,
+    fitted_range,
+    stages,
+)
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import TRIADS, NominalScale, Quantity, RawArray
+from procedures.core.unit_correction import UnitCorrection
 
 IN_NAMES = {"rad/s": "rad_per_s", "m/s^2": "m_per_s2", "degC": "degC", "rad": "rad", "s": "s", "count": "count"}
 """Unit -> its form in a column's name, which every tool takes as a name."""
@@ -23,6 +31,8 @@ RATE_OF = {Quantity.ANGLE_INCREMENT: Quantity.ANGULAR_RATE, Quantity.VELOCITY_IN
 """Quantity of an increment over the sample period."""
 CALIBRATION, CORRECTION = "calibration_", "correction_"
 """Begin of the facts, by triad, that name the calibration by which samples are corrected, and give its formula."""
+TEMPERATURE = "temperature_"
+"""Begin of the facts, by kind, that name the temperature corrections by which samples are corrected."""
 LARGEST_FACTOR = 1_000_000
 
 
@@ -61,6 +71,9 @@ class Treatment:
     calibration_ids: tuple[str, ...] = ()
     decimate: int = 1
     """Samples that one mean is taken over; a rest at the end is left out."""
+    corrections: tuple[UnitCorrection, ...] = ()
+    """Temperature corrections, at most one of each kind; they come before the calibrations."""
+    correction_ids: tuple[str, ...] = ()
 
 
 TIME = Column("time_s", np.dtype(np.float64), {"unit": "s", "quantity": "time since the first sample"})
@@ -120,13 +133,19 @@ def physical_sheet(part: Extract, blocks: Iterable[RawArray], treatment: Treatme
         about[f"{CORRECTION}{calibration.triad}"] = _formula(calibration)
         for index in place:
             units[index] = calibration.input_unit
-    columns = _physical_columns(part, units, about)
+    warmth = stages(part, asked.corrections)
+    columns = _physical_columns(part, units, about, asked)
+    for correction, known in zip(asked.corrections, asked.correction_ids, strict=True):
+        about |= {f"{TEMPERATURE}{correction.kind}": known, f"fitted_range_{correction.kind}": fitted_range(correction)}
+        about["sensors"] = SENSORS_AS_READ
     scale = NominalScale.of(part.info.channels, part.info.rate_hz)
-    values = _means(_corrected(blocks, scale, places), asked.decimate)
+    values = _means(_corrected(blocks, scale, warmth, places), asked.decimate)
     return Sheet((TIME, *columns), about, rows, _timed(part, values, asked.decimate))
 
 
-def _physical_columns(part: Extract, units: list[str], about: Mapping[str, str]) -> tuple[Column, ...]:
+def _physical_columns(
+    part: Extract, units: list[str], about: Mapping[str, str], asked: Treatment
+) -> tuple[Column, ...]:
     """Columns in SI: the quantity is that of the numbers, a rate where the channel gives increments."""
     wanted = [f"{c.name}_{IN_NAMES[unit]}" for c, unit in zip(part.info.channels, units, strict=True)]
     columns: list[Column] = []
@@ -134,8 +153,10 @@ def _physical_columns(part: Extract, units: list[str], about: Mapping[str, str])
         quantity = RATE_OF.get(channel.quantity, channel.quantity)
         said = {"channel": channel.name, "quantity": quantity.value, "unit": unit}
         triad = next((t for t, axes in TRIADS.items() if channel.name in axes), "")
-        if (known := about.get(f"{CALIBRATION}{triad}")) is not None:
-            said["corrected_by"] = known
+        pairs = zip(asked.corrections, asked.correction_ids, strict=True)
+        by = [known for one, known in pairs if channel.name in corrected_channels(one)]
+        if by := [*by, *([about[f"{CALIBRATION}{triad}"]] if f"{CALIBRATION}{triad}" in about else [])]:
+            said["corrected_by"] = ", ".join(by)
         columns.append(Column(name, np.dtype(np.float64), said))
     return tuple(columns)
 
@@ -160,10 +181,16 @@ def _place(part: Extract, calibration: TriadCalibration) -> list[int]:
 
 
 def _corrected(
-    blocks: Iterable[RawArray], scale: NominalScale, places: list[tuple[list[int], Array, Array]]
+    blocks: Iterable[RawArray],
+    scale: NominalScale,
+    warmth: Sequence[Stage],
+    places: list[tuple[list[int], Array, Array]],
 ) -> Iterator[Array]:
     for block in blocks:
         values = scale.rates(np.asarray(block, dtype=np.float64))
+        read = values.copy() if warmth else values
+        for stage in warmth:
+            stage(values, read)
         for place, bias, inverse in places:
             values[:, place] = (values[:, place] - bias) @ inverse.T
         yield values
