@@ -16,6 +16,7 @@ from scipy.io import loadmat, savemat
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.export import ExportFormat, Extract, export, extract
 from bench_service.formats.proposal.model import Proposal
+from bench_service.formats.samples_out.archive import archived
 from bench_service.formats.samples_out.naming import file_stem
 from bench_service.formats.samples_out.sheet import Sheet, Treatment, physical_sheet, raw_sheet
 from bench_service.formats.samples_out.sheet_files import SheetFormat, written
@@ -139,6 +140,16 @@ def test_a_csv_without_a_place_for_facts_is_simulated_by_its_name() -> None:
         assert proposal.description["simulated"] is True
         assert read(packed, {**proposal.description, "simulated": False}, known)[0].description.simulated
     assert "simulated" not in proposed(data, "simulated-drive.csv").description
+
+
+def test_a_zip_of_a_job_is_simulated_by_the_names_in_it() -> None:
+    data = file_of(physical(), SheetFormat.CSV)
+    packed = b"".join(archived([(f"001-{file_stem(part_of(), 'physical')}.csv", [data], {})], {}))
+    proposal = proposed(packed, "job.zip")
+    assert (proposal.unknown, proposal.description["simulated"]) == ([], True)
+    recording, found = read(packed, {**proposal.description, "simulated": False}, "job.zip")
+    assert recording.description.simulated
+    np.testing.assert_allclose(found, values(), rtol=1e-14)
 
 
 def test_what_a_mixed_bench_recorded_stays_so() -> None:

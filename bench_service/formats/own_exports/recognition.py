@@ -13,6 +13,7 @@ from bench_service.formats.columnar import is_columnar
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.joined_files import Opened
 from bench_service.formats.logs.table import SelfDescribing
+from bench_service.formats.logs.zipped import Zipped
 from bench_service.formats.own_exports.model import MARKS, OwnExport
 from bench_service.formats.samples_out.distinct_names import distinct
 from bench_service.formats.samples_out.naming import SIMULATED
@@ -46,15 +47,16 @@ def provenance(opened: Sequence[Opened]) -> Provenance:
             exports.append({"file": name, **own.kept})
             origin = own.origin or origin
             warnings += [f"{name}: {words}" for words in own.cautions()]
-        if (own is not None and own.simulated) or is_named_simulated(name):
+        if (own is not None and own.simulated) or is_named_simulated(one):
             simulated = True
             warnings.append(f"{name} is an export of a simulated recording: what comes of it stays marked as simulated")
     return Provenance(simulated, origin, tuple(exports), tuple(warnings))
 
 
-def is_named_simulated(name: str) -> bool:
-    """Return whether a file's name says that its samples are simulated, as names of our exports do."""
-    return SIMULATED.search(name) is not None
+def is_named_simulated(opened: Opened) -> bool:
+    """Return whether the name of a file, or of one in a zip, says that samples are simulated, as our exports' do."""
+    members = opened.log.members if isinstance(opened.log, Zipped) else ()
+    return any(SIMULATED.search(name) for name in (opened.file.name, *members))
 
 
 def own_export(opened: Opened) -> OwnExport | None:

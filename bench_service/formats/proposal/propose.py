@@ -41,7 +41,7 @@ def propose(file: ImportFile, unit: str | None, form: str | None, table: str | N
         unit = own.facts["unit"]
     if found is None or opened.log is None:
         looked = table_of(file.stream, file.name)
-        return _marked(_proposed([opened], looked, [looked.table], unit, form), own)
+        return _marked(_proposed([opened], looked, [looked.table], unit, form), opened, own)
     log = opened.log
     tables = log.tables()
     if not tables:
@@ -49,13 +49,13 @@ def propose(file: ImportFile, unit: str | None, form: str | None, table: str | N
     chosen = chosen_table(tables) if table is None else find_table(log, file.name, table, [])
     fields = {"table": chosen.name} if len(tables) > 1 else {}
     looked = Table(found.NAME, found.TITLE, chosen, fields=fields)
-    proposal = _marked(_proposed([opened], looked, tables, unit, form), own)
+    proposal = _marked(_proposed([opened], looked, tables, unit, form), opened, own)
     return proposal.model_copy(update={"suspicious": [*log.warnings, *proposal.suspicious]})
 
 
-def _marked(proposal: Proposal, own: OwnExport | None) -> Proposal:
+def _marked(proposal: Proposal, opened: Opened, own: OwnExport | None) -> Proposal:
     """Keep what a file says of its origin, where the rest of its description is read off as of any file."""
-    simulated = is_named_simulated(proposal.file) or (own is not None and own.simulated)
+    simulated = is_named_simulated(opened) or (own is not None and own.simulated)
     notes, description = list(proposal.notes), dict(proposal.description)
     if own is not None:
         notes = [f"an export of our recording {own.facts['recording']}", *notes]
