@@ -224,11 +224,8 @@ def _checks(channel: ChannelResult, limits: Limits) -> list[Check]:
 
 def planned_checks(params: Params, _context: Context) -> tuple[PlannedCheck, ...]:
     """Return the planned checks of the three channels; what they depend on is not declared, so nothing is predicted."""
-    return tuple(
-        PlannedCheck(f"{axis} {name}", largest(params.limits, field, unit))
-        for axis in AXES
-        for name, unit, field in LIMITED
-    )
+    held_to = [(name, largest(params.limits, field, unit)) for name, unit, field in LIMITED]
+    return tuple(PlannedCheck(f"{axis} {name}", limit) for axis in AXES for name, limit in held_to)
 
 
 def report(result: Result) -> Report:
