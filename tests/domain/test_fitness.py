@@ -266,3 +266,64 @@ def test_what_cannot_be_inspected_is_named() -> None:
         FitnessStream(COUNTS, 0.0)
     with pytest.raises(BadParameter, match="gravity_m_s2"):
         FitnessSettings(gravity_m_s2=1.0)
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0, 57.29578])
+@pytest.mark.parametrize("n", [2000, 40_000])
+def test_a_channel_that_repeats_another_is_named(factor: float, n: int) -> None:
+    samples = generator(12).normal([1e-4, -2e-4, 3e-4, 9.8, 0.1, 0.2], [1e-6] * 3 + [0.01] * 3, (n, 6))
+    assert not found(look(samples, SI))
+    samples[:, 2] = 5e-5 + factor * (samples[:, 0] - 1e-4)
+    finding = _only(samples, "gyro_z", Kind.TWIN, channels=SI)
+    assert finding.severity is Severity.WARN
+    words = {1.0: "gyro_z repeats channel gyro_x sample", -1.0: "gyro_x negated", 57.29578: "gyro_x × 57.2958"}
+    assert words[factor] in finding.sentence
+
+
+def test_counts_that_are_copied_are_named_and_those_of_one_motion_are_not() -> None:
+    samples = wide(5000)
+    samples[:, 1] = -samples[:, 0]
+    assert "negated" in _only(samples, "gyro_y", Kind.TWIN).sentence
+    samples[2500, 1] += 1
+    assert not found(look(samples))
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+@pytest.mark.parametrize("dtype", [np.int32, np.float64])
+def test_a_channel_that_only_steps_is_dead(steps: int, dtype: type) -> None:
+    samples = wide(30_000).astype(dtype)
+    samples[:, 4] = np.arange(30_000) // (30_000 // (steps + 1)) * 40
+    finding = _only(samples, "accelerometer_y", Kind.CONSTANT)
+    assert finding.severity is Severity.REFUSE
+    told = "one change" if steps == 1 else "4 changes"
+    assert f"stands still but for {told} within 0 … {40 * steps}" in finding.sentence
+    assert f"at sample {30_000 // (steps + 1)} " in finding.sentence
+    # A counter across the Earth's rate gives a pulse now and then, and a dwell of a coarse channel is as quiet.
+    counter = (generator(3).random((30_000, 6)) < 1e-3).astype(np.int32)
+    counter[:, 4] = 0
+    counter[1000, 4] = 1
+    assert not found(look(counter, COUNTERS))
+    assert Kind.CONSTANT not in [f.kind for f in found(look(samples, beside_others=True)).get("accelerometer_y", [])]
+
+
+@pytest.mark.parametrize(("factor", "words"), [(1000.0, "mg declared as g"), (1000 / 9.80665, "looks like mg")])
+def test_a_single_accelerometer_reads_no_more_than_gravity(factor: float, words: str) -> None:
+    for columns in ([5], [3, 5]):
+        channels = tuple(SI[c] for c in columns)
+        samples = generator(4).normal(9.8, 0.01, (3000, len(columns)))
+        assert not found(look(samples, channels))
+        (finding,) = found(look(samples * factor, channels))["accelerometer_z"]
+        assert (finding.kind, finding.severity) == (Kind.WRONG_UNIT, Severity.REFUSE)
+        assert words in finding.sentence
+    (finding,) = found(look(samples * 1.5, channels))["accelerometer_z"]
+    assert finding.severity is Severity.WARN
+    assert "14.7 m/s^2 where at most gravity, 9.8066 m/s² + 30 %, was expected" in finding.sentence
+
+
+@pytest.mark.parametrize("scale", [1e-100, 1e200])
+def test_a_scale_beyond_reason_is_refused(scale: float) -> None:
+    samples = generator(5).normal(0.0, 1.0, (3000, 1)) * scale
+    finding = _only(samples, "gyro_x", Kind.WRONG_UNIT, channels=SI[:1])
+    assert finding.severity is Severity.REFUSE
+    assert "channel gyro_x" in finding.sentence
+    assert "scale" in finding.sentence

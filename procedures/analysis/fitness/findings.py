@@ -35,6 +35,7 @@ class Kind(StrEnum):
     UNLIKELY_RATE = "unlikely_rate"
     STANDS_STILL = "stands_still"
     COPIED = "copied"
+    TWIN = "twin"
     WRAPPED = "wrapped"
     NOISE_CHANGE = "noise_change"
 

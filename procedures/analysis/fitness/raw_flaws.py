@@ -3,9 +3,16 @@
 from procedures.analysis.fitness.bits import Bits
 from procedures.analysis.fitness.edges import RAILS, Edge
 from procedures.analysis.fitness.findings import Finding, FitnessSettings, Kind, Severity
-from procedures.analysis.fitness.wording import Wording
+from procedures.analysis.fitness.wording import Wording, gain_of
 from procedures.analysis.fitness.wraps import Wrap
 from procedures.core.recording import AROUND, INCREMENTS, Channel
+
+MOST_CHANGES, SAMPLES_OF_CHANGE = 5, 200
+"""Most changes of a channel that gives no signal, and fewest samples for each of them: fewer samples of a coarse
+channel may well be as quiet."""
+SAME_RATIO = 1e-5
+GREATEST_VALUE, LEAST_SPREAD = 1e18, 1e-24
+"""Bounds of values and of their variation [SI], far from those of any sensor."""
 
 
 def length(name: str, seen: int, announced: int | None, settings: FitnessSettings) -> list[Finding]:
@@ -55,6 +62,47 @@ def constant(
     silent = (counter and settings.counters_may_rest) or settings.beside_others
     severity = Severity.WARN if silent and not railed else Severity.REFUSE
     return [Finding(Kind.CONSTANT, severity, told, 0, words.seen)]
+
+
+def beyond_reason(channel: Channel, low: float, high: float, words: Wording) -> list[Finding]:
+    """Return the finding on values that no unit makes something of: squares of them overflow, or vanish."""
+    size = abs(gain_of(channel, words.rate_hz))
+    most, spread = max(abs(low), abs(high)) * size, (high * 0.5 - low * 0.5) * size * 2.0
+    if most <= GREATEST_VALUE and spread >= LEAST_SPREAD:
+        return []
+    value = f"reads up to {most:.3g}" if most > GREATEST_VALUE else f"varies by {spread:.3g}"
+    told = (
+        f"channel {channel.name} {value} {channel.rate_unit} where {LEAST_SPREAD:g} … {GREATEST_VALUE:g} is the widest "
+        "range of any sensor: its unit or its scale is wrong"
+    )
+    return [Finding(Kind.WRONG_UNIT, Severity.REFUSE, told, 0, words.seen)]
+
+
+def is_dead(channel: Channel, changes: int, seen: int, is_integer: bool, settings: FitnessSettings) -> bool:
+    """Return whether a channel changes so rarely that it gives no signal between: not a counter, nor a short dwell."""
+    rests = channel.quantity in AROUND or (is_integer and channel.quantity in INCREMENTS) or settings.beside_others
+    return not rests and 0 < changes <= MOST_CHANGES and seen >= SAMPLES_OF_CHANGE * changes
+
+
+def dead(
+    channel: Channel, values: tuple[float, float], changes: int, first_index: int, words: Wording
+) -> list[Finding]:
+    """Return the finding on a channel that stands still but for a few changes; `values`: its least and greatest."""
+    times = "one change" if changes == 1 else f"{changes} changes"
+    told = (
+        f"channel {channel.name}: the channel stands still but for {times} within {values[0]:.9g} … {values[1]:.9g}, "
+        f"the first at sample {words.at(first_index)}, in all {words.seen} samples; a live channel shows noise"
+    )
+    return [Finding(Kind.CONSTANT, Severity.REFUSE, told, first_index, words.seen)]
+
+
+def twin(name: str, of: str, ratio: float) -> str:
+    """Return the sentence on a channel that repeats another one; `ratio` of their changes."""
+    factor = "" if abs(ratio - 1.0) < SAME_RATIO else " negated" if abs(ratio + 1.0) < SAME_RATIO else f" × {ratio:.6g}"
+    return (
+        f"channel {name} repeats channel {of}{factor} sample by sample: two sensors never agree so, one of the two "
+        "columns holds the other's values"
+    )
 
 
 def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: int, words: Wording) -> list[Finding]:

@@ -17,13 +17,16 @@ from procedures.analysis.fitness.pieces import Mask, Piece, Pieces, Samples
 from procedures.analysis.fitness.plausibility import Readings, unlikely_rate
 from procedures.analysis.fitness.repeats import Repeats
 from procedures.analysis.fitness.stalls import Stalls
-from procedures.analysis.fitness.wording import Wording
+from procedures.analysis.fitness.twins import Twins
+from procedures.analysis.fitness.wording import Wording, gain_of
 from procedures.analysis.fitness.wraps import Wraps
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 from procedures.core.recording import AROUND, INCREMENTS, TRIADS, Channel, RawArray, Recording
 
 _SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
+
+_FALSIFIES = (Kind.WRAPPED, Kind.CONSTANT, Kind.WRONG_UNIT)
 
 FEW_SHARE = 1e-3
 """Greatest share of outliers for which a result without them still represents the channel."""
@@ -53,27 +56,35 @@ class FitnessStream:
         self._repeats = Repeats(number)
         self._stalls = Stalls(_groups(self._channels), number)
         self._copies = Copies(number)
+        self._twins = Twins(self._channels)
         self._jumps = Jumps(number)
         self._levels = Levels(number, count)
         self._wraps = Wraps([c.scale if c.unit == "degC" else None for c in self._channels])
         self._readings = Readings(self._channels, rate_hz)
+        self._first_change = [-1] * number
         self._missing = np.zeros(number, np.int64)
         self._first_missing = [0] * number
         self._is_integer = False
 
     def add(self, block: RawArray) -> None:
         """Inspect the next samples, shape (n, channels), int32 or float64. Raises `BadParameter` for another shape."""
-        for piece in self._pieces.add(block):
-            self._inspect(piece)
+        with np.errstate(over="ignore", invalid="ignore"):  # of absurd values, which are refused at the end
+            for piece in self._pieces.add(block):
+                self._inspect(piece)
 
     def finish(self) -> tuple[ChannelFitness, ...]:
         """Return the findings, channel by channel; no block may follow."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._findings()
+
+    def _findings(self) -> tuple[ChannelFitness, ...]:
         for piece in self._pieces.finish():
             self._inspect(piece)
         words = Wording(self._pieces.seen, self._rate_hz)
         found = [self._of_values(c, channel, words) for c, channel in enumerate(self._channels)]
         if words.seen >= max(self._settings.least_samples, 2):
             self._of_repeats(found, words)
+            self._of_twins(found)
             self._of_readings(found, words)
             if self._settings.at_rest:
                 self._of_course(found, words)
@@ -101,10 +112,15 @@ class FitnessStream:
                 self._count_missing(piece.missing, start)
             self._extremes(x, same, start)
             zeros = np.array([np.count_nonzero(row) for row in same], np.int64)
-            self._repeats.add(same, zeros, start + x.shape[1] - same.shape[1])
-            self._stalls.add(same, zeros, start + x.shape[1] - same.shape[1])
+            first = start + x.shape[1] - same.shape[1]
+            for c in np.flatnonzero(zeros < same.shape[1]).tolist():
+                if self._first_change[c] < 0:
+                    self._first_change[c] = first + int(np.argmin(same[c]))
+            self._repeats.add(same, zeros, first)
+            self._stalls.add(same, zeros, first)
             resolution = self._resolution()
             self._copies.add(piece.d, resolution)
+            self._twins.add(piece.d)
             self._levels.add(piece)
             self._wraps.add(piece)
             self._readings.add(x)
@@ -146,6 +162,13 @@ class FitnessStream:
             return found + raw_flaws.constant(channel, edges[0].extreme, self._is_integer, words, settings)
         if words.seen < settings.least_samples or lost == words.seen:
             return found
+        beyond = raw_flaws.beyond_reason(channel, edges[1].extreme, edges[0].extreme, words)
+        if beyond:
+            return beyond
+        changes = self._repeats.pairs - int(self._repeats.zeros[c]) if not lost else words.seen
+        if raw_flaws.is_dead(channel, changes, words.seen, self._is_integer, settings):
+            values = edges[1].extreme, edges[0].extreme
+            return found + raw_flaws.dead(channel, values, changes, self._first_change[c], words)
         wrap = self._wraps.found(c, edges[1].extreme, edges[0].extreme)
         if wrap is not None:
             return found + raw_flaws.wrapped(channel, wrap, words)
@@ -193,6 +216,14 @@ class FitnessStream:
             for c in together:
                 found[c].append(finding)
 
+    def _of_twins(self, found: list[list[Finding]]) -> None:
+        """Add findings on channels that repeat another one, which is then one of the two sensors."""
+        for twin in self._twins.found():
+            channel, of = self._channels[twin.column], self._channels[twin.of]
+            ratio = twin.ratio * gain_of(channel, self._rate_hz) / gain_of(of, self._rate_hz)
+            told = raw_flaws.twin(channel.name, of.name, ratio if channel.rate_unit == of.rate_unit else twin.ratio)
+            found[twin.column].append(Finding(Kind.TWIN, Severity.WARN, told, 0, self._pieces.seen))
+
     def _alike(self, columns: Sequence[int]) -> list[list[int]]:
         """Copied channels of one sensor, which repeat about as often."""
         groups: list[list[int]] = []
@@ -217,7 +248,7 @@ class FitnessStream:
         doubts = self._readings.doubts(self._settings, mean, usual)
         for c, channel in enumerate(self._channels):
             doubt = doubts.get(channel.name)
-            if doubt is None or any(f.kind in (Kind.WRAPPED, Kind.CONSTANT) for f in found[c]):
+            if doubt is None or any(f.kind in _FALSIFIES for f in found[c]):
                 continue
             kind = Kind.WRONG_RATE if doubt.of_rate else Kind.WRONG_UNIT
             refused = doubt.certain and not (doubt.of_rate and self._settings.seeks_scale)
