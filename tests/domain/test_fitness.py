@@ -327,3 +327,17 @@ def test_a_scale_beyond_reason_is_refused(scale: float) -> None:
     assert finding.severity is Severity.REFUSE
     assert "channel gyro_x" in finding.sentence
     assert "scale" in finding.sentence
+
+
+@pytest.mark.parametrize("step", [1e-7, -1e-7])
+def test_a_counter_in_place_of_a_sensor_is_refused(step: float) -> None:
+    samples = generator(5).normal([1e-4, 1e-4, 1e-4, 9.8, 0.1, 0.1], [1e-6] * 3 + [1e-3] * 3, (3000, 6))
+    samples[:, 1] = step * np.arange(3000)
+    finding = _only(samples, "gyro_y", Kind.EVEN_STEPS, channels=SI)
+    assert finding.severity is Severity.REFUSE
+    assert "is this the right column?" in finding.sentence
+    packets = wide(3000)
+    packets[:, 3] = np.arange(3000) % 256
+    assert "grows by 1 count" in _only(packets, "accelerometer_x", Kind.EVEN_STEPS).sentence
+    samples[:, 1] = 1e-7 * np.arange(3000) + generator(6).normal(0.0, 3e-8, 3000)
+    assert not any(f.kind is Kind.EVEN_STEPS for fs in found(look(samples, SI)).values() for f in fs)

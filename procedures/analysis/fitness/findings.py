@@ -36,6 +36,7 @@ class Kind(StrEnum):
     STANDS_STILL = "stands_still"
     COPIED = "copied"
     TWIN = "twin"
+    EVEN_STEPS = "even_steps"
     WRAPPED = "wrapped"
     NOISE_CHANGE = "noise_change"
 

@@ -3,7 +3,7 @@
 from procedures.analysis.fitness.bits import Bits
 from procedures.analysis.fitness.edges import RAILS, Edge
 from procedures.analysis.fitness.findings import Finding, FitnessSettings, Kind, Severity
-from procedures.analysis.fitness.wording import Wording, gain_of
+from procedures.analysis.fitness.wording import Wording, amount, gain_of
 from procedures.analysis.fitness.wraps import Wrap
 from procedures.core.recording import AROUND, INCREMENTS, Channel
 
@@ -96,13 +96,26 @@ def dead(
     return [Finding(Kind.CONSTANT, Severity.REFUSE, told, first_index, words.seen)]
 
 
-def twin(name: str, of: str, ratio: float) -> str:
-    """Return the sentence on a channel that repeats another one; `ratio` of their changes."""
+def twin(channel: Channel, of: Channel, ratio: float, words: Wording) -> Finding:
+    """Return the finding on a channel that repeats another one; `ratio` of their changes in raw units."""
+    if channel.rate_unit == of.rate_unit:
+        ratio *= gain_of(channel, words.rate_hz) / gain_of(of, words.rate_hz)
     factor = "" if abs(ratio - 1.0) < SAME_RATIO else " negated" if abs(ratio + 1.0) < SAME_RATIO else f" × {ratio:.6g}"
-    return (
-        f"channel {name} repeats channel {of}{factor} sample by sample: two sensors never agree so, one of the two "
-        "columns holds the other's values"
+    told = (
+        f"channel {channel.name} repeats channel {of.name}{factor} sample by sample: two sensors never agree so, one "
+        "of the two columns holds the other's values"
     )
+    return Finding(Kind.TWIN, Severity.WARN, told, 0, words.seen)
+
+
+def grows_evenly(channel: Channel, step: float, words: Wording) -> Finding:
+    """Return the finding on a channel that changes by the same amount, `step` raw, from sample to sample."""
+    grows = "grows" if step > 0.0 else "falls"
+    told = (
+        f"channel {channel.name} {grows} by {amount(channel, words.rate_hz, abs(step))} from each sample to the next: "
+        "a counter or a clock does so, a sensor at rest shows noise; is this the right column?"
+    )
+    return Finding(Kind.EVEN_STEPS, Severity.REFUSE, told, 0, words.seen)
 
 
 def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: int, words: Wording) -> list[Finding]:

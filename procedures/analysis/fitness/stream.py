@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from procedures.analysis.fitness import raw_flaws, time_flaws
 from procedures.analysis.fitness.bits import Bits
 from procedures.analysis.fitness.copies import Copies
+from procedures.analysis.fitness.counters import Counters
 from procedures.analysis.fitness.edges import Edge, counted
 from procedures.analysis.fitness.findings import ChannelFitness, Finding, FitnessSettings, Kind, Severity
 from procedures.analysis.fitness.jumps import WHITE, Jump, Jumps
@@ -18,15 +19,15 @@ from procedures.analysis.fitness.plausibility import Readings, unlikely_rate
 from procedures.analysis.fitness.repeats import Repeats
 from procedures.analysis.fitness.stalls import Stalls
 from procedures.analysis.fitness.twins import Twins
-from procedures.analysis.fitness.wording import Wording, gain_of
+from procedures.analysis.fitness.wording import Wording
 from procedures.analysis.fitness.wraps import Wraps
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 from procedures.core.recording import AROUND, INCREMENTS, TRIADS, Channel, RawArray, Recording
 
-_SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
+_SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT, Kind.EVEN_STEPS)
 
-_FALSIFIES = (Kind.WRAPPED, Kind.CONSTANT, Kind.WRONG_UNIT)
+_FALSIFIES = (Kind.WRAPPED, Kind.CONSTANT, Kind.EVEN_STEPS, Kind.WRONG_UNIT)
 
 FEW_SHARE = 1e-3
 """Greatest share of outliers for which a result without them still represents the channel."""
@@ -57,6 +58,7 @@ class FitnessStream:
         self._stalls = Stalls(_groups(self._channels), number)
         self._copies = Copies(number)
         self._twins = Twins(self._channels)
+        self._counters = Counters()
         self._jumps = Jumps(number)
         self._levels = Levels(number, count)
         self._wraps = Wraps([c.scale if c.unit == "degC" else None for c in self._channels])
@@ -84,7 +86,7 @@ class FitnessStream:
         found = [self._of_values(c, channel, words) for c, channel in enumerate(self._channels)]
         if words.seen >= max(self._settings.least_samples, 2):
             self._of_repeats(found, words)
-            self._of_twins(found)
+            self._of_pretenders(found, words)
             self._of_readings(found, words)
             if self._settings.at_rest:
                 self._of_course(found, words)
@@ -121,6 +123,7 @@ class FitnessStream:
             resolution = self._resolution()
             self._copies.add(piece.d, resolution)
             self._twins.add(piece.d)
+            self._counters.add(piece.d)
             self._levels.add(piece)
             self._wraps.add(piece)
             self._readings.add(x)
@@ -216,13 +219,14 @@ class FitnessStream:
             for c in together:
                 found[c].append(finding)
 
-    def _of_twins(self, found: list[list[Finding]]) -> None:
-        """Add findings on channels that repeat another one, which is then one of the two sensors."""
+    def _of_pretenders(self, found: list[list[Finding]], words: Wording) -> None:
+        """Add findings on channels that hold no sensor's own values: another's, or a time where the unit rests."""
         for twin in self._twins.found():
             channel, of = self._channels[twin.column], self._channels[twin.of]
-            ratio = twin.ratio * gain_of(channel, self._rate_hz) / gain_of(of, self._rate_hz)
-            told = raw_flaws.twin(channel.name, of.name, ratio if channel.rate_unit == of.rate_unit else twin.ratio)
-            found[twin.column].append(Finding(Kind.TWIN, Severity.WARN, told, 0, self._pieces.seen))
+            found[twin.column].append(raw_flaws.twin(channel, of, twin.ratio, words))
+        for c, step in self._counters.found().items() if self._settings.at_rest else ():
+            if self._channels[c].quantity not in AROUND:
+                found[c] = [raw_flaws.grows_evenly(self._channels[c], step, words)]
 
     def _alike(self, columns: Sequence[int]) -> list[list[int]]:
         """Copied channels of one sensor, which repeat about as often."""
