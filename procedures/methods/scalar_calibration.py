@@ -18,7 +18,13 @@ from procedures.analysis.calibration.misfit import (
 )
 from procedures.analysis.calibration.poses import Poses, rows_as_poses, station_poses
 from procedures.analysis.calibration.reference import INPUT_UNITS
-from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
+from procedures.analysis.calibration.scalar import (
+    PARAMETERS,
+    ScalarFit,
+    fit_from_starts,
+    nominal_start,
+    starts_from_data,
+)
 from procedures.analysis.calibration.slow_noise import slow_share
 from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.still import StillSettings, pose_excess, pose_means, still_stretches
@@ -134,9 +140,10 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     if len(poses.outputs) >= LEAST_TO_JUDGE:
         require_live(params.triad, poses.outputs, poses.output_unit)
     reference = _reference(params)
-    start = start_from_data(poses.outputs, reference) if poses.output_unit == "count" else nominal_start()
+    in_counts = poses.output_unit == "count"
+    starts = starts_from_data(poses.outputs, reference) if in_counts else (nominal_start(),)
     what = f"the nine scalar {params.triad} parameters"
-    fit = fit_scalar(what, poses.outputs, poses.noise, reference, start, poses.known)
+    fit = fit_from_starts(what, poses.outputs, poses.noise, reference, starts, poses.known)
     gains: Array = np.diagonal(np.linalg.inv(fit.correction)).astype(np.float64)
     require_plausible_scales(params.triad, gains, poses.output_unit != "count")
     return _result(fit, params, poses)
