@@ -182,8 +182,14 @@ def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> Po
         return rows_as_poses(recording, samples, params.triad, params.pose_sd, unit)
     settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
     stretches = still_stretches(samples, info.rate_hz, settings)
-    if not stretches:
-        raise UnfitRecording(f"recording {info.id}: no still stretch was found")
+    if len(stretches) < len(PARAMETERS):
+        held = s.shortest_s + s.window_s + 2.0 * s.margin_s
+        found = f"{len(stretches)} still stretch{'es' if len(stretches) != 1 else ''}"
+        raise UnfitRecording(
+            f"recording {info.id}: {found} found, at least {len(PARAMETERS)} different poses are needed: hold each for "
+            f"{held:g} s (still.shortest_s + still.window_s + 2·still.margin_s), or make those shorter, and turn "
+            f"farther between; where a hand trembles, a greater still.factor than {s.factor:g} finds more"
+        )
     outputs, sd = pose_means(samples, stretches)
     output_unit = info.channels[info.column(names[0])].rate_unit
     windows = np.array([[p.start, p.stop] for p in stretches]) / info.rate_hz + info.start_s

@@ -341,3 +341,31 @@ def test_a_counter_in_place_of_a_sensor_is_refused(step: float) -> None:
     assert "grows by 1 count" in _only(packets, "accelerometer_x", Kind.EVEN_STEPS).sentence
     samples[:, 1] = 1e-7 * np.arange(3000) + generator(6).normal(0.0, 3e-8, 3000)
     assert not any(f.kind is Kind.EVEN_STEPS for fs in found(look(samples, SI)).values() for f in fs)
+
+
+def test_a_dead_band_is_no_row_sent_twice() -> None:
+    rate = generator(8).normal(0.0, 1e-4, (30_000, 1))
+    finding = _only(np.where(np.abs(rate) < 1.5e-4, 0.0, rate), "gyro_x", Kind.REPEATED, channels=SI[:1])
+    assert "nearly all of them at 0: a dead band or a threshold" in finding.sentence
+    filtered = np.median(np.lib.stride_tricks.sliding_window_view(rate[:, 0], 5), axis=1)[:, None]
+    finding = _only(filtered, "gyro_x", Kind.REPEATED, channels=SI[:1])
+    assert "rows seem to be sent more than once" in finding.sentence
+    assert "a filter, such as a median, holds values" in finding.sentence
+
+
+def test_pulses_of_one_weight_are_not_saturated() -> None:
+    weight = 1.11 * np.pi / 180 / 3600
+    angle = np.cumsum(generator(9).normal(2.4e-5 / RATE_HZ, 1e-8, 60_000))
+    # Differences of a floating angle: each count comes out in several roundings.
+    steps = np.diff(np.round(angle / weight) * weight, prepend=0.0)[:, None]
+    assert len(np.unique(steps)) > 8
+    channel = (Channel("gyro_x", Quantity.ANGLE_INCREMENT, "rad"),)
+    assert not [f for fs in found(look(steps, channel)).values() for f in fs if f.kind is Kind.SATURATED]
+
+
+def test_zeros_for_lost_samples_are_suspected() -> None:
+    samples = wide(30_000).astype(np.float64)
+    samples[::500, 3] = 0.0
+    (finding,) = found(look(samples))["accelerometer_x"]
+    assert finding.severity is Severity.REFUSE
+    assert "zeros seem to stand for lost samples" in finding.sentence

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.calibration.slow_noise import slow_excess
+from procedures.analysis.calibration.slow_noise import GROUPS, slow_excess
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 
@@ -95,6 +95,13 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
 
 
 def pose_excess(samples: Array, stretches: tuple[Stretch, ...], batches: int = 12) -> Array:
-    """Return the excess variance of every stretch's mean due to slow noise (`slow_excess`), shape (poses, 3)."""
-    parts = (np.array_split(samples[p.start : p.stop], batches) for p in stretches)
-    return np.array([slow_excess(np.array([part.mean(axis=0) for part in pose])) for pose in parts]).reshape(-1, 3)
+    """Return the excess variance of every stretch's mean due to slow noise (`slow_excess`), shape (poses, 3);
+    zero of a stretch too short to show it.
+    """
+    excess = []
+    for stretch in stretches:
+        pose = samples[stretch.start : stretch.stop]
+        parts = np.array_split(pose, min(batches, len(pose)))
+        means = np.array([part.mean(axis=0) for part in parts])
+        excess.append(slow_excess(means) if len(means) >= GROUPS else np.zeros(samples.shape[1]))
+    return np.array(excess).reshape(-1, 3)

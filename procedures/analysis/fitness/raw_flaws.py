@@ -135,6 +135,8 @@ def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: in
             )
         elif edge.piles_up(repeats, words.seen, other):
             told = f"{begin}the {word}, and no more than {edge.near} at any of the next three values"
+            zeros = "zeros seem to stand for lost samples, which NaN marks; or "
+            end = end.replace("; ", f"; {zeros}", 1) if value == 0.0 and edge.is_far else end
             found.append(Finding(Kind.SATURATED, Severity.REFUSE, f"{told}{end}", edge.first_index, count))
     return found
 

@@ -121,6 +121,8 @@ class FitnessStream:
             self._repeats.add(same, zeros, first)
             self._stalls.add(same, zeros, first)
             resolution = self._resolution()
+            if not start:
+                self._copies.note_values(x, same)
             self._copies.add(piece.d, resolution)
             self._twins.add(piece.d)
             self._counters.add(piece.d)
@@ -215,7 +217,8 @@ class FitnessStream:
             repeats = int(self._repeats.zeros[together[0]])
             # A copied sample cannot have repeated by chance; some of the other samples did, and are no copies.
             repeats -= round(self._copies.by_chance(together[0]) * words.seen)
-            finding = time_flaws.copied(names, repeats, not witnesses and not held, words, self._settings)
+            value = self._copies.at_one_value.get(together[0])
+            finding = time_flaws.copied(names, repeats, not witnesses and not held, value, words, self._settings)
             for c in together:
                 found[c].append(finding)
 
