@@ -274,7 +274,10 @@ def require_finite(info: RecordingInfo, names: Sequence[str], samples: Array) ->
     """Refuse samples (n, channels) that are not numbers. Raises `UnfitRecording` naming the channel."""
     bad = np.flatnonzero(~np.all(np.isfinite(samples), axis=0))
     if bad.size:
-        raise UnfitRecording(f"recording {info.id}: channel {names[bad[0]]} holds samples that are not numbers")
+        raise UnfitRecording(
+            f"recording {info.id}: channel {names[bad[0]]} holds samples that are not numbers: "
+            "import it without gaps, or give a stretch without them (start_s and stop_s)"
+        )
 
 
 def require_complete(info: RecordingInfo, seen: int) -> None:

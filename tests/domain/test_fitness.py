@@ -369,3 +369,23 @@ def test_zeros_for_lost_samples_are_suspected() -> None:
     (finding,) = found(look(samples))["accelerometer_x"]
     assert finding.severity is Severity.REFUSE
     assert "zeros seem to stand for lost samples" in finding.sentence
+
+
+@pytest.mark.parametrize("times", [2, 3])
+@pytest.mark.parametrize("integer", [True, False])
+def test_a_file_joined_with_itself_is_refused(times: int, integer: bool) -> None:
+    samples = wide(20_000).astype(np.int32 if integer else np.float64)
+    flaws = found(look(np.vstack([samples] * times)))
+    assert sorted(flaws) == sorted(c.name for c in COUNTS)
+    (finding,) = flaws["gyro_x"]
+    assert (finding.kind, finding.severity) == (Kind.REPEATED, Severity.REFUSE)
+    assert f"hold itself {times} times" in finding.sentence
+    assert "One part is 200 s long (stop_s)" in finding.sentence
+
+
+def test_missing_samples_name_the_ways_out() -> None:
+    samples = wide(2000).astype(np.float64)
+    samples[1200:, :] = np.nan
+    assert "a stretch without them (start_s and stop_s)" in found(look(samples))["gyro_x"][0].sentence
+    samples[:, 1] = np.nan
+    assert "leave the channel out (channels)" in found(look(samples))["gyro_y"][0].sentence

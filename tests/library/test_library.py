@@ -163,7 +163,7 @@ def test_a_fit_that_does_not_describe_the_poses_says_so(rng: np.random.Generator
     assert reversed_z.warnings[0].startswith("channel z answers its own axis with -0.99")
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_poses_on_one_side_give_no_other_units_numbers(seed: int) -> None:
     """A wide cap determines them; a narrow one is refused, or right within what it claims. Never a false minimum."""
     for spread in (0.15, 0.4, 1.5):
@@ -176,7 +176,7 @@ def test_poses_on_one_side_give_no_other_units_numbers(seed: int) -> None:
         except inertial.Undetermined:
             assert spread < 1.0
             continue
-        # Of 4·3 fits with 6 coefficients each, 4.5 standard uncertainties are exceeded once in a thousand runs.
+        # Of 2·3 fits with 6 coefficients each, 4.5 standard uncertainties are exceeded once in a thousand runs.
         away = np.array([*(found.bias - [0.05, -0.03, 0.08]), *(np.diagonal(found.matrix) - 1.0)])
         assert np.all(np.abs(away) < 4.5 * np.array([found.sd[k] for k in ("b_x", "b_y", "b_z", "K11", "K22", "K33")]))
 

@@ -1,5 +1,8 @@
 """Findings on raw values: missing ones, a constant channel, ends of ranges, bits, wraps."""
 
+from collections.abc import Sequence
+from math import gcd
+
 from procedures.analysis.fitness.bits import Bits
 from procedures.analysis.fitness.edges import RAILS, Edge
 from procedures.analysis.fitness.findings import Finding, FitnessSettings, Kind, Severity
@@ -11,6 +14,11 @@ MOST_CHANGES, SAMPLES_OF_CHANGE = 5, 200
 """Most changes of a channel that gives no signal, and fewest samples for each of them: fewer samples of a coarse
 channel may well be as quiet."""
 SAME_RATIO = 1e-5
+WITHOUT_GAPS = (
+    "; ways out: a stretch without them (start_s and stop_s), or an Allan deviation that leaves gaps out (gaps)"
+)
+LEAST_LEVELS = 24
+"""Fewest outermost levels whose counts show a repetition: by chance all are even once in 2^24."""
 GREATEST_VALUE, LEAST_SPREAD = 1e18, 1e-24
 """Bounds of values and of their variation [SI], far from those of any sensor."""
 
@@ -32,7 +40,9 @@ def missing(name: str, count: int, first: int, words: Wording, settings: Fitness
     if not count:
         return []
     severity = Severity.REFUSE if settings.gaps == "refuse" else Severity.WARN
-    treated = "" if severity is Severity.REFUSE else "; they are left out as gaps"
+    treated = "; they are left out as gaps"
+    if severity is Severity.REFUSE:
+        treated = WITHOUT_GAPS if count < words.seen else "; leave the channel out (channels), or import it anew"
     told = (
         f"channel {name}: {words.share(count)} {'are' if count > 1 else 'is'} not a finite number, "
         f"the first is sample {words.at(first)}{treated}"
@@ -76,6 +86,23 @@ def beyond_reason(channel: Channel, low: float, high: float, words: Wording) -> 
         "range of any sensor: its unit or its scale is wrong"
     )
     return [Finding(Kind.WRONG_UNIT, Severity.REFUSE, told, 0, words.seen)]
+
+
+def repeats_itself(edges: Sequence[tuple[Edge, Edge]], words: Wording, settings: FitnessSettings) -> list[Finding]:
+    """Return the finding on a recording that holds itself more than once: each of its outermost levels then occurs
+    once, twice, … as often as in one part. `edges` of the channels that are samples of sensors.
+    """
+    counts = [count for pair in edges for edge in pair for count in edge.levels.values()]
+    times = gcd(*counts) if len(counts) >= LEAST_LEVELS else 1
+    if times < 2:
+        return []
+    one_s = words.seen / words.rate_hz / times
+    told = (
+        f"the recording seems to hold itself {times} times: every largest and smallest value of all channels occurs "
+        f"{times} times or a multiple of it; was a file joined with itself? One part is {one_s:.6g} s long (stop_s)"
+    )
+    severity = Severity.WARN if settings.means_only else Severity.REFUSE
+    return [Finding(Kind.REPEATED, severity, told, 0, words.seen, of_row=True)]
 
 
 def is_dead(channel: Channel, changes: int, seen: int, is_integer: bool, settings: FitnessSettings) -> bool:

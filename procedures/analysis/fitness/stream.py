@@ -212,7 +212,7 @@ class FitnessStream:
             severity = Severity.WARN if self._settings.means_only else Severity.REFUSE
             for c in held:
                 found[c].append(Finding(Kind.REPEATED, severity, told, self._repeats.first_index, rows, of_row=True))
-        for together in self._alike(copied):
+        for together in time_flaws.alike(copied, self._channels, self._repeats.zeros):
             names = [self._channels[c].name for c in together]
             repeats = int(self._repeats.zeros[together[0]])
             # A copied sample cannot have repeated by chance; some of the other samples did, and are no copies.
@@ -227,25 +227,14 @@ class FitnessStream:
         for twin in self._twins.found():
             channel, of = self._channels[twin.column], self._channels[twin.of]
             found[twin.column].append(raw_flaws.twin(channel, of, twin.ratio, words))
+        own = [c for c, channel in enumerate(self._channels) if channel.quantity not in AROUND and not found[c]]
+        if own and not self._missing.any() and all(2 * self._repeats.zeros[c] < self._repeats.pairs for c in own):
+            for flaw in raw_flaws.repeats_itself([self._edges[c] for c in own], words, self._settings):
+                for c in own:
+                    found[c].append(flaw)
         for c, step in self._counters.found().items() if self._settings.at_rest else ():
             if self._channels[c].quantity not in AROUND:
                 found[c] = [raw_flaws.grows_evenly(self._channels[c], step, words)]
-
-    def _alike(self, columns: Sequence[int]) -> list[list[int]]:
-        """Copied channels of one sensor, which repeat about as often."""
-        groups: list[list[int]] = []
-        for c in columns:
-            near = [g for g in groups if self._channels[g[0]].quantity is self._channels[c].quantity]
-            near = [
-                g
-                for g in near
-                if abs(self._repeats.zeros[g[0]] - self._repeats.zeros[c]) < 0.05 * self._repeats.zeros[c]
-            ]
-            if near:
-                near[0].append(c)
-            else:
-                groups.append([c])
-        return groups
 
     def _of_readings(self, found: list[list[Finding]], words: Wording) -> None:
         """Add findings on units and rates that contradict the readings of a unit at rest."""

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.analysis.fitness.changes import Change, changes
 from procedures.analysis.fitness.findings import Finding, FitnessSettings, Kind, Severity
@@ -136,6 +137,19 @@ def stands_still(group: Group, names: Sequence[str], words: Wording) -> Finding:
         told += f"; from samples {_places(group, words)}"
     severity = Severity.REFUSE if total > SHORT_SHARE * words.seen else Severity.WARN
     return Finding(Kind.STANDS_STILL, severity, told, longest.first_index, total)
+
+
+def alike(columns: Sequence[int], channels: Sequence[Channel], repeats: NDArray[np.int64]) -> list[list[int]]:
+    """Return copied channels by sensor: those of one quantity that repeat about as often; `repeats` (channels,)."""
+    groups: list[list[int]] = []
+    for c in columns:
+        near = [g for g in groups if channels[g[0]].quantity is channels[c].quantity]
+        near = [g for g in near if abs(repeats[g[0]] - repeats[c]) < 0.05 * repeats[c]]
+        if near:
+            near[0].append(c)
+        else:
+            groups.append([c])
+    return groups
 
 
 def copied(
