@@ -20,6 +20,6 @@ def ellipsoid(points: Array) -> tuple[Array, Array] | None:
     q = np.array([[p[0], p[3], p[4]], [p[3], p[1], p[5]], [p[4], p[5], p[2]]])
     if not np.all(np.linalg.eigvalsh(q) > 0.0):
         return None
-    centre = -0.5 * np.linalg.solve(q, p[6:])
+    centre: Array = (-0.5 * np.linalg.solve(q, p[6:])).astype(np.float64)
     factor = np.linalg.cholesky(q / (1.0 + float(centre @ q @ centre))).T / unit
     return centre * unit, np.asarray(factor, dtype=np.float64)
