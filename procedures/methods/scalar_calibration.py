@@ -27,12 +27,11 @@ from procedures.analysis.calibration.scalar import (
 )
 from procedures.analysis.calibration.slow_noise import slow_share
 from procedures.analysis.calibration.station_noise import outputs_covariance
-from procedures.analysis.calibration.still import StillSettings, pose_excess, pose_means, still_stretches
+from procedures.analysis.calibration.still import StillSettings, pose_excess, pose_means, require_poses, still_stretches
 from procedures.analysis.calibration.triad_analysis import scatter_covariance
 from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significance, verdict
 from procedures.core.recording import TRIADS, Recording, rates, require_finite
@@ -183,14 +182,7 @@ def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> Po
         return rows_as_poses(recording, samples, params.triad, params.pose_sd, unit)
     settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
     stretches = still_stretches(samples, info.rate_hz, settings)
-    if len(stretches) < len(PARAMETERS):
-        held = s.shortest_s + s.window_s + 2.0 * s.margin_s
-        found = f"{len(stretches)} still stretch{'es' if len(stretches) != 1 else ''}"
-        raise UnfitRecording(
-            f"recording {info.id}: {found} found, at least {len(PARAMETERS)} different poses are needed: hold each for "
-            f"{held:g} s (still.shortest_s + still.window_s + 2·still.margin_s), or make those shorter, and turn "
-            f"farther between; where a hand trembles, a greater still.factor than {s.factor:g} finds more"
-        )
+    require_poses(info.id, stretches, len(PARAMETERS), settings)
     outputs, sd = pose_means(samples, stretches)
     output_unit = info.channels[info.column(names[0])].rate_unit
     windows = np.array([[p.start, p.stop] for p in stretches]) / info.rate_hz + info.start_s

@@ -63,6 +63,19 @@ def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | No
     return tuple(c for c in cut if c.stop - c.start >= max(2.0, s.shortest_s * rate_hz))
 
 
+def require_poses(recording_id: str, stretches: tuple[Stretch, ...], fewest: int, settings: StillSettings) -> None:
+    """Refuse fewer still stretches than a calibration needs, with how long to hold a pose. Raises `UnfitRecording`."""
+    if len(stretches) >= fewest:
+        return
+    s, found = settings, f"{len(stretches)} still stretch{'es' if len(stretches) != 1 else ''}"
+    raise UnfitRecording(
+        f"recording {recording_id}: {found} found, at least {fewest} different poses are needed: hold each for "
+        f"{s.shortest_s + s.window_s + 2.0 * s.margin_s:g} s (still.shortest_s + still.window_s + 2·still.margin_s), "
+        "or make those shorter, and turn farther between; where a hand trembles, a greater still.factor than "
+        f"{s.factor:g} finds more"
+    )
+
+
 def moving_variance(samples: Array, width: int) -> Array:
     """Return the sample variance in a centred window of `width` samples, shape of `samples`; at the ends of what is
     there.
