@@ -6,7 +6,7 @@ Nothing is guessed: a channel without a unit, or an unknown key, is refused befo
 from enum import StrEnum
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from bench_service.formats.input_units import stored_channel
 from procedures.core.recording import Channel, Quantity
@@ -22,6 +22,12 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 TICKS = {**SECONDS, "100us": 1e-4}
 """The units above, and the ticks of 0.1 ms of Xsens' SampleTimeFine."""
+
+
+GREATEST = 1e20
+"""Greatest size of a scale, a period or an offset, its inverse the least scale: no sensor comes near."""
+
+SLOWEST_HZ, FASTEST_HZ = 1e-9, 1e9
 
 
 class Accumulated(StrEnum):
@@ -52,10 +58,23 @@ class ImportedChannel(_Strict):
     )
     unit: str = Field(description="of scale·(raw − offset): rad/s, deg/s, m/s^2, g, …; count: the scale is not known")
     scale: float = 1.0
-    offset: float = 0.0
+    offset: float = Field(0.0, ge=-GREATEST, le=GREATEST)
     period: float | None = Field(
-        None, gt=0, description="for an angle or velocity: where its raw value begins again, 360 or 65536 for example"
+        None,
+        gt=0,
+        le=GREATEST,
+        description="for an angle or velocity: where its raw value begins again, 360 or 65536 for example",
     )
+
+    @field_validator("scale")
+    @classmethod
+    def _is_of_a_sensor(cls, scale: float) -> float:
+        if not 1.0 / GREATEST <= abs(scale) <= GREATEST:
+            raise ValueError(
+                f"scale {scale!r} must be finite, the scale not zero: {1.0 / GREATEST:g} … {GREATEST:g}, or the same "
+                "negative where the axis is reversed; it is the number of units in one step of the raw values"
+            )
+        return scale
 
     @model_validator(mode="after")
     def _means_something(self) -> Self:
@@ -138,6 +157,13 @@ class ImportDescription(_Strict):
     )
     simulated: bool = False
     reference_values: dict[str, float] = Field(default_factory=dict, description="known truths, kept with the source")
+
+    @field_validator("rate_hz")
+    @classmethod
+    def _is_a_rate(cls, rate_hz: float | None) -> float | None:
+        if rate_hz is not None and not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+            raise ValueError(f"rate_hz {rate_hz!r}: {SLOWEST_HZ:g} … {FASTEST_HZ:g} Hz are taken, in samples a second")
+        return rate_hz
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:

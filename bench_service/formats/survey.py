@@ -112,7 +112,7 @@ class Survey:
                 channel = self._description.channels[column]
                 at = self._count + row + len(values) - len(rows) + self._description.rows.first
                 self._outside = (
-                    f"{self._names[channel.file]}: row {at}, channel {channel.name!r}: {rows[row, column]:.0f} does "
+                    f"{self._names[channel.file]}: row {at}, channel {channel.name!r}: {rows[row, column]:.12g} does "
                     f"not fit 32 bits; counts between {_INT32.min} and {_INT32.max} are expected"
                 )
         return True

@@ -61,7 +61,10 @@ def cosine_series(cells: Array, cell_s: float, most: int = MOST) -> CosineSeries
     if not np.all(np.isfinite(cells)):
         raise UnfitRecording(f"cell {int(np.argmin(np.isfinite(cells)))} is not finite: a transient cannot be sought")
     if np.ptp(cells) == 0.0:
-        raise UnfitRecording("all cells are equal: the channel is constant")
+        raise UnfitRecording(
+            "the means of all cells are equal: the channel is constant, or repeats a pattern that each cell averages "
+            "out"
+        )
     group = -(-len(cells) // most)
     values = cells[: len(cells) // group * group].reshape(-1, group).mean(axis=1)
     length = group * cell_s

@@ -62,6 +62,10 @@ AROUND = (Quantity.TEMPERATURE, Quantity.TABLE_ANGLE, Quantity.TIME)
 angles of the table, and the ages of its readings."""
 
 
+LEAST_SCALE, GREATEST_SCALE = 1e-30, 1e30
+"""Bounds of a scale, far beyond any sensor's: with others squares of values overflow, or vanish."""
+
+
 @dataclass(frozen=True)
 class Channel:
     """Channel of a recording: name, quantity, unit of ``scale·(raw − offset)``, scale and offset."""
@@ -78,10 +82,11 @@ class Channel:
                 f"channel {self.name!r}: unit {self.unit!r} is none of {', '.join(UNITS[self.quantity])}, "
                 f"which a channel of {self.quantity.value} may have"
             )
-        if not (np.isfinite(self.scale) and self.scale != 0.0 and np.isfinite(self.offset)):
+        if not (LEAST_SCALE <= abs(self.scale) <= GREATEST_SCALE and abs(self.offset) <= GREATEST_SCALE):
             raise ValueError(
                 f"channel {self.name!r}: scale {self.scale!r} and offset {self.offset!r} must be finite, "
-                "the scale not zero"
+                f"the scale not zero: {LEAST_SCALE:g} … {GREATEST_SCALE:g} or the same negative, the offset within "
+                f"±{GREATEST_SCALE:g}"
             )
 
     @property
@@ -269,7 +274,10 @@ def require_finite(info: RecordingInfo, names: Sequence[str], samples: Array) ->
     """Refuse samples (n, channels) that are not numbers. Raises `UnfitRecording` naming the channel."""
     bad = np.flatnonzero(~np.all(np.isfinite(samples), axis=0))
     if bad.size:
-        raise UnfitRecording(f"recording {info.id}: channel {names[bad[0]]} holds samples that are not numbers")
+        raise UnfitRecording(
+            f"recording {info.id}: channel {names[bad[0]]} holds samples that are not numbers: "
+            "import it without gaps, or give a stretch without them (start_s and stop_s)"
+        )
 
 
 def require_complete(info: RecordingInfo, seen: int) -> None:

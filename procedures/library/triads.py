@@ -5,17 +5,29 @@ from typing import Any
 
 import numpy as np
 
+from procedures.analysis.calibration.misfit import require_live, require_plausible_scales
 from procedures.analysis.calibration.multiposition import fit_triad
-from procedures.analysis.calibration.scalar import fit_scalar, start_from_data
+from procedures.analysis.calibration.scalar import PARAMETERS, fit_from_starts, starts_from_data
 from procedures.analysis.calibration.table_errors import TableErrors
 from procedures.core.arrays import Array
-from procedures.core.errors import BadParameter
+from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, correct
 from procedures.library.arguments import Samples, positive, vectors
 from procedures.library.figure import axes
 
 SHARE_OF_RANGE = 1e-9
 """First estimate of unknown noise, relative to the largest output: far too small, so that the residuals scale it up."""
+
+LEAST_TO_JUDGE = 5
+"""Fewest poses from which a channel that hardly changes is refused: fewer need not turn every axis."""
+OPEN = 0.01
+"""Standard uncertainty, relative to full scale, from which on a coefficient is left open by the poses."""
+NOT_LINEAR = 0.05
+"""The same from which on the magnitudes' linear uncertainties do not hold: poses on one side leave a long valley."""
+OWN_SHARE = 0.5
+"""Least share of a channel's answer that its own axis has."""
+UNLIKELY = 1e-4
+"""Probability of a chi-square as large, below which a misfit is reported."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +43,8 @@ class Calibration:
     degrees_of_freedom: int
     p_value: float | None
     """Chance of a chi-square at least as large; None: the noise was not given, so nothing can be judged."""
+    warnings: tuple[str, ...] = ()
+    """Sentences on a bad fit, on coefficients that the poses leave open, and on a channel that is reversed."""
 
     @property
     def bias(self) -> Array:
@@ -55,7 +69,8 @@ class Calibration:
         pairs = zip(COEFFICIENT_NAMES, self.triad.coefficients, self.triad.standard_uncertainties, strict=True)
         fit = f"χ² {self.chi_square:.3g} of {self.degrees_of_freedom}"
         judged = "noise not given: not judged" if self.p_value is None else f"p = {self.p_value:.2g}"
-        return "\n".join([*(f"{name} {value:.9g} ± {sd:.2g}" for name, value, sd in pairs), f"{fit}, {judged}"])
+        lines = [*(f"{name} {value:.9g} ± {sd:.2g}" for name, value, sd in pairs), f"{fit}, {judged}"]
+        return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the residuals by pose with their expected standard deviations; returns the axes."""
@@ -89,12 +104,16 @@ def calibrate(
         raise BadParameter("known", f"{len(given)} vectors", f"as many as there are poses, {len(measured)}")
     if len(measured) == 4 and sd is None:
         raise BadParameter("sd", None, "the standard deviation of the means: four poses leave no residual to find it")
+    if len(measured) >= LEAST_TO_JUDGE and np.all(np.ptp(given, axis=0) > 0.0):
+        require_live(triad, measured, "of the output", given)
     noise = _noise(sd, measured)
     flawless = TableErrors(np.zeros((len(given), 3, 0)), np.zeros(0), ())
     fit = fit_triad(triad, "count", _input_unit(triad), given, measured, noise, flawless, sd is not None, "noise")
-    return Calibration(
-        fit.calibration(), fit.residuals, fit.residual_sd, fit.chi_square, fit.degrees_of_freedom, fit.p_value
-    )
+    calibration = fit.calibration()
+    chi_square, degrees = fit.chi_square, fit.degrees_of_freedom
+    largest = float(np.abs(given).max())
+    warnings = _warnings(calibration, fit.residuals, largest, fit.p_value, chi_square, degrees)
+    return Calibration(calibration, fit.residuals, fit.residual_sd, chi_square, degrees, fit.p_value, warnings)
 
 
 def scalar(
@@ -110,17 +129,57 @@ def scalar(
         raise BadParameter("sd", None, "the standard deviation of the means: nine poses leave no residual to find it")
     reference = positive("magnitude", magnitude)
     what = f"the nine scalar {triad} parameters"
-    start = start_from_data(measured, reference)
     unit = _input_unit(triad)
-    fit = fit_scalar(what, measured, _noise(sd, measured), reference, start, sd is not None)
-    return Calibration(
-        fit.calibration(triad, "count", unit),
-        fit.residuals,
-        fit.residual_sd,
-        fit.chi_square,
-        fit.degrees_of_freedom,
-        fit.p_value,
-    )
+    if len(measured) >= LEAST_TO_JUDGE:
+        require_live(triad, measured, "of the output")
+    starts = starts_from_data(measured, reference)
+    fit = fit_from_starts(what, measured, _noise(sd, measured), reference, starts, sd is not None)
+    calibration = fit.calibration(triad, "count", unit)
+    lost = _left_open(calibration, reference, NOT_LINEAR)
+    if lost:
+        raise Undetermined(what, lost, len(PARAMETERS) - len(lost), len(PARAMETERS), fit.condition)
+    require_plausible_scales(triad, np.diagonal(calibration.matrix_array), nominal=False)
+    chi_square, degrees = fit.chi_square, fit.degrees_of_freedom
+    warnings = _warnings(calibration, fit.residuals, reference, fit.p_value, chi_square, degrees)
+    return Calibration(calibration, fit.residuals, fit.residual_sd, chi_square, degrees, fit.p_value, warnings)
+
+
+def _warnings(
+    calibration: TriadCalibration,
+    residuals: Array,
+    size: float,
+    p_value: float | None,
+    chi_square: float,
+    degrees: int,
+) -> tuple[str, ...]:
+    """Sentences on a fit of inputs up to `size` [SI]: coefficients left open, a channel on another axis, a misfit."""
+    found: list[str] = []
+    matrix = calibration.matrix_array
+    for axis, row, own in zip("xyz", matrix, np.diagonal(matrix).tolist(), strict=True):
+        if own < OWN_SHARE * float(np.linalg.norm(row)):
+            found.append(
+                f"channel {axis} answers its own axis with {own:.4g} of {np.linalg.norm(row):.4g}: it is reversed, or "
+                "exchanged with another, or the poses are not those that are given"
+            )
+    left_open = _left_open(calibration, size, OPEN)
+    if left_open:
+        found.append(f"practically undetermined by these poses: {', '.join(left_open)}")
+    worst = int(np.argmax(np.abs(residuals).reshape(len(residuals), -1).max(axis=1)))
+    if p_value is not None and p_value < UNLIKELY:
+        found.append(
+            f"the poses do not fit: chi-square is {chi_square:.3g} where {degrees} is expected, so the uncertainties "
+            f"above do not hold; the worst is pose {worst + 1}: was it clipped, moved, or given another vector?"
+        )
+    return tuple(found)
+
+
+def _left_open(calibration: TriadCalibration, size: float, limit: float) -> tuple[str, ...]:
+    """The coefficients whose standard uncertainty exceeds the limit, relative to the channel's full scale."""
+    sd = calibration.standard_uncertainties.reshape(3, 4)
+    full = np.linalg.norm(calibration.matrix_array, axis=1)[:, None]
+    relative = (sd / np.concatenate([full * size, full, full, full], axis=1)).ravel()
+    pairs = zip(COEFFICIENT_NAMES, relative.tolist(), strict=True)
+    return tuple(f"{name} (± {value:.2g} of full scale)" for name, value in pairs if value > limit)
 
 
 def _input_unit(triad: str) -> str:

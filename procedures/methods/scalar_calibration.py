@@ -18,15 +18,20 @@ from procedures.analysis.calibration.misfit import (
 )
 from procedures.analysis.calibration.poses import Poses, rows_as_poses, station_poses
 from procedures.analysis.calibration.reference import INPUT_UNITS
-from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
+from procedures.analysis.calibration.scalar import (
+    PARAMETERS,
+    ScalarFit,
+    fit_from_starts,
+    nominal_start,
+    starts_from_data,
+)
 from procedures.analysis.calibration.slow_noise import slow_share
 from procedures.analysis.calibration.station_noise import outputs_covariance
-from procedures.analysis.calibration.still import StillSettings, pose_excess, pose_means, still_stretches
+from procedures.analysis.calibration.still import StillSettings, pose_excess, pose_means, require_poses, still_stretches
 from procedures.analysis.calibration.triad_analysis import scatter_covariance
 from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significance, verdict
 from procedures.core.recording import TRIADS, Recording, rates, require_finite
@@ -135,9 +140,10 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     if len(poses.outputs) >= LEAST_TO_JUDGE:
         require_live(params.triad, poses.outputs, poses.output_unit)
     reference = _reference(params)
-    start = start_from_data(poses.outputs, reference) if poses.output_unit == "count" else nominal_start()
+    in_counts = poses.output_unit == "count"
+    starts = starts_from_data(poses.outputs, reference) if in_counts else (nominal_start(),)
     what = f"the nine scalar {params.triad} parameters"
-    fit = fit_scalar(what, poses.outputs, poses.noise, reference, start, poses.known)
+    fit = fit_from_starts(what, poses.outputs, poses.noise, reference, starts, poses.known)
     gains: Array = np.diagonal(np.linalg.inv(fit.correction)).astype(np.float64)
     require_plausible_scales(params.triad, gains, poses.output_unit != "count")
     return _result(fit, params, poses)
@@ -176,8 +182,7 @@ def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> Po
         return rows_as_poses(recording, samples, params.triad, params.pose_sd, unit)
     settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
     stretches = still_stretches(samples, info.rate_hz, settings)
-    if not stretches:
-        raise UnfitRecording(f"recording {info.id}: no still stretch was found")
+    require_poses(info.id, stretches, len(PARAMETERS), settings)
     outputs, sd = pose_means(samples, stretches)
     output_unit = info.channels[info.column(names[0])].rate_unit
     windows = np.array([[p.start, p.stop] for p in stretches]) / info.rate_hz + info.start_s

@@ -220,6 +220,11 @@ def _series(
     departures: dict[str, Array] = {}
     dynamic: dict[str, NDArray[np.bool_]] = {}
     for sensor, readings in zip(of_sensors, cells.rates[len(sensors) :], strict=True):
+        if np.ptp(readings) == 0.0:
+            raise UnfitRecording(
+                f"recording {recording.info.id}: channel {sensor} reads {readings[0]:.6g} °C all the time: nothing can "
+                "depend on it; is the thermometer stuck, or is another sensor meant (sensor, own_sensors)?"
+            )
         temperature = known.corrected(sensor, readings) if known is not None and known.has(sensor) else readings
         if params.lag_s > 0.0:
             temperature = without_lag(temperature, cells.cell_s, params.lag_s)

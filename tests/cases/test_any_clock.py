@@ -1,12 +1,14 @@
 """Time columns of any rate, resolution and losses: what was left out is found, and nothing else is."""
 
+import re
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.cases.tables import chance, read, timed
+from tests.cases.tables import chance, read, refusal, timed
 
 QUICK = settings(max_examples=40, deadline=None, derandomize=True)
 
@@ -65,3 +67,38 @@ def test_rows_that_come_in_batches_are_none_lost(rate_hz: float, batch: int, spr
     assert source["clock"]["lost_samples"] == 0
     # From batch to batch, or through stamps that are off by a batch at most at each end.
     assert abs(source["rate_of_time_column_hz"] / rate_hz - 1.0) <= 2.0 * batch / 4000
+
+
+@pytest.mark.parametrize("rate_hz", [100.3, 130.7, 400.7, 2000.5, 7999.0])
+def test_stamps_in_whole_seconds_give_the_rate(rate_hz: float) -> None:
+    rows = int(12 * rate_hz)
+    source = _clock(np.floor(np.arange(rows) / rate_hz).astype(int))
+    assert source["clock"]["lost_samples"] == 0
+    # From the second batch to the last: ten batches, each end off by a row at most.
+    assert abs(source["rate_of_time_column_hz"] - rate_hz) <= 2.0 / 10.0
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "says"),
+    [
+        (1500, 3000, 'rows 1501 to 3000, 1500 in a row, have one time.*rows = {"first": 1, "last": 1501} ends there'),
+        (0, 1000, 'rows 1 to 1000, 1000 in a row, have one time.*rows = {"first": 1000} begins after it'),
+        (1000, 1300, "rows 1001 to 1300, 300 in a row"),
+    ],
+)
+def test_a_clock_that_stands_still_is_named_with_the_rows_that_move(begin: int, end: int, says: str) -> None:
+    rows = np.arange(3000)
+    stamps = np.maximum(rows, end - 1) if begin == 0 else np.where((rows >= begin) & (rows < end), begin, rows)
+    text, description = timed(stamps / 100)
+    assert re.search(says, refusal(text, **description))
+
+
+def test_rows_that_waited_for_the_link_are_no_clock_that_stands_still() -> None:
+    stamps = np.arange(3000) / 100
+    stamps[1000:1300] = 13.0
+    assert _clock(stamps)["clock"]["lost_samples"] == 0
+
+
+def test_two_stamps_are_no_clock() -> None:
+    text, description = timed(np.where(np.arange(3000) < 2000, 0.0, 128.0))
+    assert "only 2 different times, at least 5 are needed" in refusal(text, **description)

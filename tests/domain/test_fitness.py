@@ -266,3 +266,126 @@ def test_what_cannot_be_inspected_is_named() -> None:
         FitnessStream(COUNTS, 0.0)
     with pytest.raises(BadParameter, match="gravity_m_s2"):
         FitnessSettings(gravity_m_s2=1.0)
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0, 57.29578])
+@pytest.mark.parametrize("n", [2000, 40_000])
+def test_a_channel_that_repeats_another_is_named(factor: float, n: int) -> None:
+    samples = generator(12).normal([1e-4, -2e-4, 3e-4, 9.8, 0.1, 0.2], [1e-6] * 3 + [0.01] * 3, (n, 6))
+    assert not found(look(samples, SI))
+    samples[:, 2] = 5e-5 + factor * (samples[:, 0] - 1e-4)
+    finding = _only(samples, "gyro_z", Kind.TWIN, channels=SI)
+    assert finding.severity is Severity.WARN
+    words = {1.0: "gyro_z repeats channel gyro_x sample", -1.0: "gyro_x negated", 57.29578: "gyro_x × 57.2958"}
+    assert words[factor] in finding.sentence
+
+
+def test_counts_that_are_copied_are_named_and_those_of_one_motion_are_not() -> None:
+    samples = wide(5000)
+    samples[:, 1] = -samples[:, 0]
+    assert "negated" in _only(samples, "gyro_y", Kind.TWIN).sentence
+    samples[2500, 1] += 1
+    assert not found(look(samples))
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+@pytest.mark.parametrize("dtype", [np.int32, np.float64])
+def test_a_channel_that_only_steps_is_dead(steps: int, dtype: type) -> None:
+    samples = wide(30_000).astype(dtype)
+    samples[:, 4] = np.arange(30_000) // (30_000 // (steps + 1)) * 40
+    finding = _only(samples, "accelerometer_y", Kind.CONSTANT)
+    assert finding.severity is Severity.REFUSE
+    told = "one change" if steps == 1 else "4 changes"
+    assert f"stands still but for {told} within 0 … {40 * steps}" in finding.sentence
+    assert f"at sample {30_000 // (steps + 1)} " in finding.sentence
+    # A counter across the Earth's rate gives a pulse now and then, and a dwell of a coarse channel is as quiet.
+    counter = (generator(3).random((30_000, 6)) < 1e-3).astype(np.int32)
+    counter[:, 4] = 0
+    counter[1000, 4] = 1
+    assert not found(look(counter, COUNTERS))
+    assert Kind.CONSTANT not in [f.kind for f in found(look(samples, beside_others=True)).get("accelerometer_y", [])]
+
+
+@pytest.mark.parametrize(("factor", "words"), [(1000.0, "mg declared as g"), (1000 / 9.80665, "looks like mg")])
+def test_a_single_accelerometer_reads_no_more_than_gravity(factor: float, words: str) -> None:
+    for columns in ([5], [3, 5]):
+        channels = tuple(SI[c] for c in columns)
+        samples = generator(4).normal(9.8, 0.01, (3000, len(columns)))
+        assert not found(look(samples, channels))
+        (finding,) = found(look(samples * factor, channels))["accelerometer_z"]
+        assert (finding.kind, finding.severity) == (Kind.WRONG_UNIT, Severity.REFUSE)
+        assert words in finding.sentence
+    (finding,) = found(look(samples * 1.5, channels))["accelerometer_z"]
+    assert finding.severity is Severity.WARN
+    assert "14.7 m/s^2 where at most gravity, 9.8066 m/s² + 30 %, was expected" in finding.sentence
+
+
+@pytest.mark.parametrize("scale", [1e-100, 1e200])
+def test_a_scale_beyond_reason_is_refused(scale: float) -> None:
+    samples = generator(5).normal(0.0, 1.0, (3000, 1)) * scale
+    finding = _only(samples, "gyro_x", Kind.WRONG_UNIT, channels=SI[:1])
+    assert finding.severity is Severity.REFUSE
+    assert "channel gyro_x" in finding.sentence
+    assert "scale" in finding.sentence
+
+
+@pytest.mark.parametrize("step", [1e-7, -1e-7])
+def test_a_counter_in_place_of_a_sensor_is_refused(step: float) -> None:
+    samples = generator(5).normal([1e-4, 1e-4, 1e-4, 9.8, 0.1, 0.1], [1e-6] * 3 + [1e-3] * 3, (3000, 6))
+    samples[:, 1] = step * np.arange(3000)
+    finding = _only(samples, "gyro_y", Kind.EVEN_STEPS, channels=SI)
+    assert finding.severity is Severity.REFUSE
+    assert "is this the right column?" in finding.sentence
+    packets = wide(3000)
+    packets[:, 3] = np.arange(3000) % 256
+    assert "grows by 1 count" in _only(packets, "accelerometer_x", Kind.EVEN_STEPS).sentence
+    samples[:, 1] = 1e-7 * np.arange(3000) + generator(6).normal(0.0, 3e-8, 3000)
+    assert not any(f.kind is Kind.EVEN_STEPS for fs in found(look(samples, SI)).values() for f in fs)
+
+
+def test_a_dead_band_is_no_row_sent_twice() -> None:
+    rate = generator(8).normal(0.0, 1e-4, (30_000, 1))
+    finding = _only(np.where(np.abs(rate) < 1.5e-4, 0.0, rate), "gyro_x", Kind.REPEATED, channels=SI[:1])
+    assert "nearly all of them at 0: a dead band or a threshold" in finding.sentence
+    filtered = np.median(np.lib.stride_tricks.sliding_window_view(rate[:, 0], 5), axis=1)[:, None]
+    finding = _only(filtered, "gyro_x", Kind.REPEATED, channels=SI[:1])
+    assert "rows seem to be sent more than once" in finding.sentence
+    assert "a filter, such as a median, holds values" in finding.sentence
+
+
+def test_pulses_of_one_weight_are_not_saturated() -> None:
+    weight = 1.11 * np.pi / 180 / 3600
+    angle = np.cumsum(generator(9).normal(2.4e-5 / RATE_HZ, 1e-8, 60_000))
+    # Differences of a floating angle: each count comes out in several roundings.
+    steps = np.diff(np.round(angle / weight) * weight, prepend=0.0)[:, None]
+    assert len(np.unique(steps)) > 8
+    channel = (Channel("gyro_x", Quantity.ANGLE_INCREMENT, "rad"),)
+    assert not [f for fs in found(look(steps, channel)).values() for f in fs if f.kind is Kind.SATURATED]
+
+
+def test_zeros_for_lost_samples_are_suspected() -> None:
+    samples = wide(30_000).astype(np.float64)
+    samples[::500, 3] = 0.0
+    (finding,) = found(look(samples))["accelerometer_x"]
+    assert finding.severity is Severity.REFUSE
+    assert "zeros seem to stand for lost samples" in finding.sentence
+
+
+@pytest.mark.parametrize("times", [2, 3])
+@pytest.mark.parametrize("integer", [True, False])
+def test_a_file_joined_with_itself_is_refused(times: int, integer: bool) -> None:
+    samples = wide(20_000).astype(np.int32 if integer else np.float64)
+    flaws = found(look(np.vstack([samples] * times)))
+    assert sorted(flaws) == sorted(c.name for c in COUNTS)
+    (finding,) = flaws["gyro_x"]
+    assert (finding.kind, finding.severity) == (Kind.REPEATED, Severity.REFUSE)
+    assert f"hold itself {times} times" in finding.sentence
+    assert "One part is 200 s long (stop_s)" in finding.sentence
+
+
+def test_missing_samples_name_the_ways_out() -> None:
+    samples = wide(2000).astype(np.float64)
+    samples[1200:, :] = np.nan
+    assert "a stretch without them (start_s and stop_s)" in found(look(samples))["gyro_x"][0].sentence
+    samples[:, 1] = np.nan
+    assert "leave the channel out (channels)" in found(look(samples))["gyro_y"][0].sentence

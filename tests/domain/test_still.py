@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.calibration.still import Stretch, moving_variance, pose_means, still_stretches
+from procedures.analysis.calibration.still import Stretch, moving_variance, pose_excess, pose_means, still_stretches
 from procedures.core.errors import UnfitRecording
+from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Quantity, RecordingInfo
+from procedures.methods import scalar_calibration
+from procedures.procedure import Evidence
 
 
 def hand_turned(seed: int = 1) -> tuple[np.ndarray, list[tuple[int, int]]]:
@@ -54,3 +57,16 @@ def test_pose_means_and_their_uncertainty():
 def test_a_recording_without_its_still_beginning_is_refused():
     with pytest.raises(UnfitRecording, match="too short"):
         still_stretches(np.zeros((1500, 3)), 100.0)
+
+
+def test_short_poses_show_no_slow_noise_and_too_few_are_counted():
+    samples, _ = hand_turned()
+    assert np.all(np.isfinite(pose_excess(samples, (Stretch(0, 2), Stretch(10, 15), Stretch(20, 400)))))
+    assert np.all(pose_excess(samples, (Stretch(0, 3),)) == 0.0)
+    triad = tuple(Channel(n, Quantity.SPECIFIC_FORCE, "m/s^2") for n in ACCELEROMETER)
+    recording = MemoryRecording(RecordingInfo("r", "U", triad, 100.0, len(samples)), samples)
+    params = scalar_calibration.Params.model_validate({"triad": "accelerometer", "gravity_m_s2": 9.8})
+    with pytest.raises(
+        UnfitRecording, match=r"6 still stretches found, at least 9 .* hold each for 2.5 s \(still.short"
+    ):
+        scalar_calibration.analyse(Evidence((recording,)), params, None)

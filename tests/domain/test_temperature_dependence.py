@@ -159,6 +159,12 @@ def test_wrong_channels_and_sensors_are_named(recordings):
         analysed([MemoryRecording(bare, recordings[0].raw[:, :3])], own_sensors={})
     with pytest.raises(UnfitRecording, match="make cell_s shorter"):
         analysed(recordings, cell_s=600.0, channels=("gyro_x",))
+    with pytest.raises(UnfitRecording, match="soaks = false"):
+        analysed(recordings, least_soak_s=86_400.0, channels=("gyro_x",))
+    stuck = recordings[0].raw.copy()
+    stuck[:, 3] = 25.0
+    with pytest.raises(UnfitRecording, match="channel temperature_gyro_x reads 25 °C all the time"):
+        analysed([MemoryRecording(recordings[0].info, stuck)], channels=("gyro_x",))
     assert temperature_dependence.report(analysed(recordings[:1], channels=("gyro_x",))).sections
 
 

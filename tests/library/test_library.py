@@ -1,5 +1,7 @@
 """The library at a prompt: other implementations, closed forms, arguments as people have them, refusals in words."""
 
+import contextlib
+
 import allantools
 import numpy as np
 import pytest
@@ -15,6 +17,19 @@ POSES = GRAVITY * np.vstack([SIX_FACES, TILTED])
 BIAS = np.array([12.0, -7.0, 3.0])
 MATRIX = np.array([[20000.0, 30.0, -40.0], [15.0, 20100.0, 25.0], [-35.0, 10.0, 19900.0]])
 NOISE = 0.5
+SOAKS_C = np.array([-40.0, -20.0, 0.0, 20.0, 40.0, 60.0])
+
+
+def _white(count: int) -> np.ndarray:
+    return 1e-4 * np.random.default_rng(1).normal(size=count)
+
+
+def _upright(seed: int) -> np.ndarray:
+    """Twenty poses within some 20 degrees of upright, of a channel with a scale factor of one."""
+    chance = np.random.default_rng(seed)
+    directions = np.column_stack([0.15 * chance.normal(size=(20, 2)), np.ones(20)])
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return [0.05, -0.03, 0.08] + GRAVITY * directions + 5e-3 * chance.normal(size=(20, 3))
 
 
 class Labelled:
@@ -134,6 +149,38 @@ def test_the_magnitude_alone_corrects_to_the_magnitude() -> None:
     assert found.sd["K21"] == found.sd["K31"] == found.sd["K32"] == 0.0
 
 
+def test_a_fit_that_does_not_describe_the_poses_says_so(rng: np.random.Generator) -> None:
+    outputs = 0.02 + POSES @ MATRIX.T / 20_000 + 5e-4 * rng.normal(size=POSES.shape)
+    assert inertial.calibrate(outputs, POSES, 5e-4).warnings == ()
+    assert inertial.scalar(outputs, GRAVITY, 5e-4).warnings == ()
+    for clipped in (
+        inertial.calibrate(np.clip(outputs, -9.0, 9.0), POSES, 5e-4),
+        inertial.scalar(np.clip(outputs, -9.0, 9.0), GRAVITY, 5e-4),
+    ):
+        assert "the poses do not fit: chi-square" in str(clipped)
+    reversed_z = inertial.calibrate(outputs * [1.0, 1.0, -1.0], POSES, 5e-4)
+    assert len(reversed_z.warnings) == 1
+    assert reversed_z.warnings[0].startswith("channel z answers its own axis with -0.99")
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_poses_on_one_side_give_no_other_units_numbers(seed: int) -> None:
+    """A wide cap determines them; a narrow one is refused, or right within what it claims. Never a false minimum."""
+    for spread in (0.15, 0.4, 1.5):
+        chance = np.random.default_rng(seed)
+        directions = np.column_stack([spread * chance.normal(size=(24, 2)), np.ones(24)])
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        outputs = [0.05, -0.03, 0.08] + GRAVITY * directions + 1e-3 * chance.normal(size=(24, 3))
+        try:
+            found = inertial.scalar(outputs, GRAVITY, 1e-3)
+        except inertial.Undetermined:
+            assert spread < 1.0
+            continue
+        # Of 2·3 fits with 6 coefficients each, 4.5 standard uncertainties are exceeded once in a thousand runs.
+        away = np.array([*(found.bias - [0.05, -0.03, 0.08]), *(np.diagonal(found.matrix) - 1.0)])
+        assert np.all(np.abs(away) < 4.5 * np.array([found.sd[k] for k in ("b_x", "b_y", "b_z", "K11", "K22", "K33")]))
+
+
 def test_a_polynomial_is_that_of_numpy(rng: np.random.Generator) -> None:
     t = np.linspace(-40.0, 60.0, 11)
     values = 5.0 + 0.01 * (t - 20.0) + 2e-4 * (t - 20.0) ** 2 + 0.01 * rng.normal(size=11)
@@ -176,6 +223,8 @@ def test_both_parts_of_a_split_are_the_record(rng: np.random.Generator) -> None:
         (lambda: inertial.noise(range(9), 1.0, unit="rpm"), "one of rad/s, deg/s, deg/h"),
         (lambda: inertial.noise(range(9), 1.0), "9 samples are too few"),
         (lambda: inertial.noise(range(9), 1.0, cell_s=0.1), "at least 1 s, one sample"),
+        (lambda: inertial.noise(_white(11_990), 100.0), "record at least 120 s, or make cell_s shorter, 0.9 at"),
+        (lambda: inertial.noise(_white(110), 1.0), "at least 120 are needed: record at least 120 s"),
         (lambda: inertial.split([1.0, 2.0], 1.0), "more samples"),
         (lambda: inertial.split(range(999), 1.0, wavelet="sym"), "an orthogonal one: haar"),
         (lambda: inertial.calibrate(POSES[:, :2], POSES), "a row of x, y, z for each pose"),
@@ -188,6 +237,10 @@ def test_both_parts_of_a_split_are_the_record(rng: np.random.Generator) -> None:
         (lambda: inertial.scalar(POSES, float("nan")), "magnitude = nan"),
         (lambda: inertial.thermal([1.0, 2.0], [1.0]), "as many as there are temperatures, 2"),
         (lambda: inertial.thermal([1.0, 2.0], [1.0, 2.0]), "2 soaks cannot give a polynomial of order 2"),
+        (lambda: inertial.thermal(SOAKS_C, SOAKS_C - 20.0, relative=True), "zero within its uncertainty"),
+        (lambda: inertial.calibrate(POSES * [1.0, 1.0, 0.0], POSES), "accelerometer z changes by 0 of the output"),
+        (lambda: inertial.scalar(POSES * [1.0, 0.0, 1.0], GRAVITY), "accelerometer y changes by 0 of the output"),
+        (lambda: inertial.scalar(_upright(1), GRAVITY, 5e-3), "b_z (± "),
         (lambda: inertial.load("absent.csv"), "absent.csv cannot be read"),
     ],
 )
@@ -220,3 +273,21 @@ def test_every_result_can_be_drawn(rng: np.random.Generator) -> None:
         assert axes.get_xlabel()
         assert axes.lines
         assert result.plot(axes) is axes
+
+
+@pytest.mark.parametrize(
+    "signal",
+    [
+        lambda i: 1e-7 * i,
+        lambda i: 1e-12 * i**2,
+        lambda i: 1e-3 * np.sin(0.647 * i),
+        lambda i: np.exp(-i / 5000.0),
+        lambda i: i + 0.2 * (i % 3),
+        lambda i: (i > 7000) * 1e-3,
+        lambda i: i % 2,
+    ],
+)
+def test_a_record_without_noise_is_refused_or_gives_limits_but_crashes_no_fit(signal) -> None:
+    with contextlib.suppress(inertial.DomainError):
+        found = inertial.noise(signal(np.arange(15_000.0)), 100.0, unit="rad/s")
+        assert found.coefficients["N"].value is None

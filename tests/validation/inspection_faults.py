@@ -191,6 +191,16 @@ def unlikely_rates(rng: Rng) -> Fault:
     return Fault(replace(record, rate_hz=rate), "unlikely_rate", (0,), says=(f"{rate:g} Hz",))
 
 
+def twins(rng: Rng) -> Fault:
+    """One sensor's values in two columns: as they are, negated, or in another unit."""
+    record = _sound(rng)
+    of, to = np.sort(rng.choice(6, 2, replace=False))
+    factor = (1, -1, 57.29577951)[int(rng.integers(3))]
+    x = record.samples.astype(np.float64) if isinstance(factor, float) else record.samples.copy()
+    x[:, to] = x[:, of] * factor
+    return Fault(replace(record, samples=x), "twin", (int(to),), says=(f"{'negated' if factor == -1 else 'repeats'}",))
+
+
 FAULTS: dict[str, Callable[[Rng], Fault]] = {
     "channel or triad stands still": stands_still,
     "rows hang": hung_rows,
@@ -207,6 +217,7 @@ FAULTS: dict[str, Callable[[Rng], Fault]] = {
     "unit off by a factor": wrong_unit,
     "degrees for radians": degrees,
     "unlikely rate": unlikely_rates,
+    "one sensor in two channels": twins,
 }
 
 __all__ = ["FAULTS", "NOISES", "Any", "Fault", "means"]

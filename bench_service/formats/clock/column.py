@@ -47,6 +47,35 @@ class Fall:
 
 
 @dataclass
+class Standstill:
+    """Longest run of rows with one stamp: its first row, from 0, its number of rows, and the step before it [s]."""
+
+    row: int = 0
+    rows: int = 1
+    step_before_s: float = 0.0
+    _row: int = 0
+    _rows: int = 1
+    _step_before_s: float = 0.0
+
+    def add(self, steps: Array, still: NDArray[np.intp], row: int) -> None:
+        """Add steps [s], those of length zero among them, and the row, from 0, that the first of them leads to."""
+        if not len(steps):
+            return
+        moving = np.flatnonzero(steps != 0.0) if len(still) else np.empty(0, np.intp)
+        if not len(still):  # of a clock that moves, only the last row can begin a run
+            self._row, self._rows, self._step_before_s = row + len(steps) - 1, 1, float(steps[-1])
+            return
+        begins = np.concatenate([[self._row], row + moving])
+        lengths = np.diff(np.concatenate([[row - self._rows], row + moving, [row + len(steps)]]))
+        before = np.concatenate([[self._step_before_s], steps[moving]])
+        longest = int(np.argmax(lengths))
+        if lengths[longest] > self.rows:
+            self.row, self.rows = int(begins[longest]), int(lengths[longest])
+            self.step_before_s = float(before[longest])
+        self._row, self._rows, self._step_before_s = int(begins[-1]), int(lengths[-1]), float(before[-1])
+
+
+@dataclass
 class ClockColumn:
     """The stamps of one file, kept in a temporary file. `scale_s`: seconds in one unit; `unwrap`: whether wraps of the
     counter are carried on.
@@ -61,6 +90,7 @@ class ClockColumn:
     wraps: list[Fall] = field(default_factory=list[Fall])
     still: int = 0
     """Number of steps whose length is zero."""
+    standstill: Standstill = field(default_factory=Standstill)
     resolution: Resolution = field(default_factory=Resolution)
     largest: float = 0.0
     """Largest stamp without its sign, in the column's unit."""
@@ -89,6 +119,7 @@ class ClockColumn:
         if len(falls):
             self._fall(falls, steps, stamps, row, time_s)
         still = np.flatnonzero(steps == 0.0)
+        self.standstill.add(steps, still, row)
         if len(still):
             self.still += len(still)
             self._repeat(still, same if self.count else same[1:], row)

@@ -19,6 +19,13 @@ LOST_DIGITS = 9.9
 """Ratio of the resolutions within one column that shows digits lost in printing."""
 MOST_PLACES = 100
 """Number of gaps that are kept with the recording."""
+STANDSTILL, SHORT_STANDSTILL = 10, 10
+"""Length of a standstill in rows that usually share a stamp; a clock that hardly shares any counts as one of 10."""
+BACKLOG = 0.4
+"""Part of the duration of rows with one stamp that the step before them has where they had waited on their way."""
+FEWEST_STAMPS, MOST_SHARED = 5, 16
+"""Fewest different stamps of a column in which so many rows, on the average, share one."""
+MOST_ROWS_OF_A_STAMP = 1 << 15
 _UNPADDED = '; where milliseconds are written without leading zeros (31.18 for 31.018), ask for clock_fraction = "ms"'
 _UNSORTED = f"; nothing is sorted: give the rows before or after it (rows), or {NO_TIME}"
 
@@ -101,6 +108,34 @@ def _require_growing(name: str, column: ClockColumn, description: ImportDescript
         raise UnfitRecording(
             f"{name}: all {column.count} rows have the time {column.first!r}: digits were lost in printing, or it is "
             f"not a time; {NO_TIME}"
+        )
+    _require_moving(name, column, description)
+
+
+def _require_moving(name: str, column: ClockColumn, description: ImportDescription) -> None:
+    """Check that the clock shows a rate. Raises `UnfitRecording` where it stands still, or has only a few stamps.
+
+    Rows that waited on their way share a stamp after a step as long as their wait; a clock that stands still has none.
+    """
+    stamps, still = column.count - column.still, column.standstill
+    usual = (column.count - still.rows) / max(stamps - 1, 1)
+    waited_s = BACKLOG * still.rows * column.duration_s / max(column.count - still.rows, 1)
+    stands = still.rows >= STANDSTILL * max(usual, SHORT_STANDSTILL) and still.step_before_s < waited_s
+    if stands and not len(_repeats(column)):
+        first = still.row + description.rows.first
+        last = first + still.rows - 1
+        at = f"{float(column.read(still.row, still.row + 1)[0]):.6g} s from the first"
+        ways = [f'rows = {{"first": {description.rows.first}, "last": {first}}} ends there'] if still.row else []
+        ways += [f'rows = {{"first": {last}}} begins after it'] if still.row + still.rows < column.count else []
+        raise UnfitRecording(
+            f"{name}: the clock stands still: rows {first} to {last}, {still.rows} in a row, have one time, {at}. "
+            f"Ways out: {'; '.join(ways)}; {NO_TIME} to take the rows as they follow"
+        )
+    shared = column.count / stamps
+    if (stamps < FEWEST_STAMPS and shared >= MOST_SHARED) or shared > MOST_ROWS_OF_A_STAMP:
+        raise UnfitRecording(
+            f"{name}: {column.count} rows have only {stamps} different times, at least {FEWEST_STAMPS} are needed to "
+            f"find a rate: digits were lost in printing, or it is not a time; {NO_TIME}"
         )
 
 

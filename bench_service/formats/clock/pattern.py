@@ -16,6 +16,8 @@ CHUNK = 64
 """Number of rows over which a clock's own error is estimated."""
 LONG_CHUNK = 1024
 """Number of rows over which a mean step is taken where rows come in batches."""
+STAMPS = 8
+"""Number of different stamps, on the average, in the rows over which a mean step is taken."""
 FEW = 16
 """Number of steps below which no order shows: they are taken as of one length, and deviations as losses."""
 COARSE = 0.9
@@ -34,6 +36,8 @@ SHARED = 1.5
 """Resolution in periods beyond which rows share stamps, which counts as batches where they are regular."""
 CLEAN = 0.002
 """Share of shorter steps that speaks against lost rows where the clock resolves only a step or two of its own."""
+MANY = 16
+"""Number of rows in a batch from which on one row more or less is as regular."""
 REGULAR = 0.9
 """Share of the long steps with the usual distance and size that make the order regular."""
 
@@ -107,9 +111,16 @@ def _chunks(stretches: Sequence[Array], rows: int) -> list[Array]:
 def _mean_step(stretches: Sequence[Array]) -> float:
     """The mean step of most chunks: a pause or a lost row is in few of them."""
     rows = sum(len(t) for t in stretches)
-    chunks = _chunks(stretches, LONG_CHUNK if rows >= 8 * LONG_CHUNK else max(CHUNK, rows // 8))
+    usual = LONG_CHUNK if rows >= 8 * LONG_CHUNK else max(CHUNK, rows // 8)
+    chunks = _chunks(stretches, max(usual, STAMPS * _shared(stretches)))
     means = np.array([(t[-1] - t[0]) / (len(t) - 1) for t in chunks])
     return float(np.median(means))
+
+
+def _shared(stretches: Sequence[Array]) -> int:
+    """Number of rows that share a stamp, on the average."""
+    moving = sum(int(np.count_nonzero(np.diff(t))) for t in stretches)
+    return sum(len(t) for t in stretches) // max(moving, 1)
 
 
 def _shortest_usual(steps: Array) -> float:
@@ -160,7 +171,7 @@ def _coarse_period(stretches: Sequence[Array], resolution_s: float, mean_s: floa
 
 def _jitter_period(stretches: Sequence[Array], mean_s: float) -> float:
     """The period of short chunks, where the mean step of long ones is longer for the rows that are lost in most."""
-    chunks = _chunks(stretches, CHUNK)
+    chunks = _chunks(stretches, max(CHUNK, STAMPS * _shared(stretches)))
     rows = min(len(t) for t in chunks)
     slopes, _ = _lines(np.array([t[:rows] for t in chunks]))
     short_s = float(np.median(slopes))
@@ -194,7 +205,8 @@ def _batch(steps: Array, mean_s: float) -> int:
     usual = int(np.median(apart))
     sizes = steps[long]
     like = np.abs(sizes / float(np.median(sizes)) - 1.0) <= 0.2
-    if usual < 2 or np.mean(apart == usual) < REGULAR or np.mean(like) < REGULAR:
+    beside = 1 if usual >= MANY else 0  # the period of a coarse clock is no whole number of samples
+    if usual < 2 or np.mean(np.abs(apart - usual) <= beside) < REGULAR or np.mean(like) < REGULAR:
         return 1
     return usual
 

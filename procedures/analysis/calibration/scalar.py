@@ -7,6 +7,7 @@ No orientation is trusted: neither the table's angles nor the quaternions of the
 magnitude, because real units have scale errors far beyond its first order.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +16,11 @@ from scipy.optimize import least_squares
 from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
 from procedures.analysis.least_squares.chi_square import judged_p_value, residual_factor
 from procedures.analysis.least_squares.determination import RANK_TOLERANCE, require_full_rank
+from procedures.analysis.least_squares.ellipsoid import ellipsoid
 from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
+from procedures.core.errors import Undetermined
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 
 PARAMETERS = ("b_x", "b_y", "b_z", "s_x", "s_y", "s_z", "t_xy", "t_xz", "t_yz")
@@ -185,6 +188,23 @@ def fit_scalar(
     )
 
 
+def fit_from_starts(
+    what: str, outputs: Array, noise_covariance: Array, reference: float, starts: Sequence[Array], noise_known: bool
+) -> ScalarFit:
+    """Return the fit of least chi-square from several first guesses: poses on one side have more than one minimum.
+
+    Raises `Undetermined` where no guess determines all parameters.
+    """
+    fits: list[ScalarFit] = []
+    for start in starts:
+        try:
+            fits.append(fit_scalar(what, outputs, noise_covariance, reference, start, noise_known))
+        except Undetermined:
+            if start is starts[-1] and not fits:
+                raise
+    return min(fits, key=lambda fit: fit.chi_square)
+
+
 def nominal_start(reference_scale: float = 1.0) -> Array:
     """Return the first guess of the nine parameters for outputs in nominal SI units, shape (9,)."""
     return np.array([0.0] * 3 + [reference_scale] * 3 + [0.0] * 3)
@@ -197,6 +217,21 @@ def start_from_data(outputs: Array, reference: float) -> Array:
     low, high = outputs.min(axis=0), outputs.max(axis=0)
     span = np.where(high > low, high - low, 1.0)
     return np.array([*(0.5 * (low + high)), *(2.0 * reference / span), 0.0, 0.0, 0.0])
+
+
+def starts_from_data(outputs: Array, reference: float) -> tuple[Array, ...]:
+    """Return first guesses (9,) for outputs of unknown scale: the ellipsoid through them where they lie on one, no bias
+    at all, and the extremes of each channel.
+    """
+    length = float(np.median(np.linalg.norm(outputs, axis=1)))
+    guesses = [nominal_start(reference / length)] if length > 0.0 else []
+    found = ellipsoid(outputs) if len(outputs) >= len(PARAMETERS) else None
+    if found is not None:
+        centre, upper = found
+        scale = np.diagonal(upper)
+        t = upper / scale
+        guesses.insert(0, np.array([*centre, *(reference * scale), t[0, 1], t[0, 2], t[1, 2]]))
+    return (*guesses, start_from_data(outputs, reference))
 
 
 def _solve(start: Array, outputs: Array, reference: float, weights: Array) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.calibration.slow_noise import slow_excess
+from procedures.analysis.calibration.slow_noise import GROUPS, slow_excess
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 
@@ -63,6 +63,19 @@ def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | No
     return tuple(c for c in cut if c.stop - c.start >= max(2.0, s.shortest_s * rate_hz))
 
 
+def require_poses(recording_id: str, stretches: tuple[Stretch, ...], fewest: int, settings: StillSettings) -> None:
+    """Refuse fewer still stretches than a calibration needs, with how long to hold a pose. Raises `UnfitRecording`."""
+    if len(stretches) >= fewest:
+        return
+    s, found = settings, f"{len(stretches)} still stretch{'es' if len(stretches) != 1 else ''}"
+    raise UnfitRecording(
+        f"recording {recording_id}: {found} found, at least {fewest} different poses are needed: hold each for "
+        f"{s.shortest_s + s.window_s + 2.0 * s.margin_s:g} s (still.shortest_s + still.window_s + 2·still.margin_s), "
+        "or make those shorter, and turn farther between; where a hand trembles, a greater still.factor than "
+        f"{s.factor:g} finds more"
+    )
+
+
 def moving_variance(samples: Array, width: int) -> Array:
     """Return the sample variance in a centred window of `width` samples, shape of `samples`; at the ends of what is
     there.
@@ -95,6 +108,13 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
 
 
 def pose_excess(samples: Array, stretches: tuple[Stretch, ...], batches: int = 12) -> Array:
-    """Return the excess variance of every stretch's mean due to slow noise (`slow_excess`), shape (poses, 3)."""
-    parts = (np.array_split(samples[p.start : p.stop], batches) for p in stretches)
-    return np.array([slow_excess(np.array([part.mean(axis=0) for part in pose])) for pose in parts]).reshape(-1, 3)
+    """Return the excess variance of every stretch's mean due to slow noise (`slow_excess`), shape (poses, 3);
+    zero of a stretch too short to show it.
+    """
+    excess = []
+    for stretch in stretches:
+        pose = samples[stretch.start : stretch.stop]
+        parts = np.array_split(pose, min(batches, len(pose)))
+        means = np.array([part.mean(axis=0) for part in parts])
+        excess.append(slow_excess(means) if len(means) >= GROUPS else np.zeros(samples.shape[1]))
+    return np.array(excess).reshape(-1, 3)

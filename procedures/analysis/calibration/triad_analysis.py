@@ -18,7 +18,7 @@ from procedures.analysis.calibration.reference_temperature import (
     thermal_share,
     thermal_warnings,
 )
-from procedures.analysis.calibration.scalar import fit_scalar, nominal_start, start_from_data
+from procedures.analysis.calibration.scalar import fit_from_starts, nominal_start, starts_from_data
 from procedures.analysis.calibration.slow_noise import slow_share
 from procedures.analysis.calibration.station_means import StationMeans, station_means
 from procedures.analysis.calibration.station_noise import outputs_covariance
@@ -228,6 +228,6 @@ def station_angles(means: StationMeans) -> list[TableAngles]:
 
 def _scalar(means: StationMeans, reference: float, noise: Array, known: bool, fit: TriadFit) -> ScalarCheck:
     in_counts = means.output_unit == "count"
-    start = start_from_data(means.outputs, reference) if in_counts else nominal_start()
-    scalar = fit_scalar(f"the scalar {fit.triad} parameters", means.outputs, noise, reference, start, known)
+    starts = starts_from_data(means.outputs, reference) if in_counts else (nominal_start(),)
+    scalar = fit_from_starts(f"the scalar {fit.triad} parameters", means.outputs, noise, reference, starts, known)
     return scalar_check(fit, scalar)

@@ -4,6 +4,7 @@
 `findings`: its results; `grouped`: those of many stations; `pieces`: the samples in pieces of equal length.
 
 One file per question: `edges` saturated, `bits` stuck or coarse, `wraps` jumps of 2^n, `repeats` rows sent twice,
-`copies` two rates, `stalls` runs that stand still, `jumps` outliers and sharp steps, `levels` and `changes` steps and
-noise, `plausibility` wrong unit or rate. `raw_flaws`, `time_flaws` and `wording` put them into words.
+`copies` two rates, `twins` one sensor in two channels, `counters` a time for a sensor, `stalls` runs that stand still,
+`jumps` outliers and sharp steps, `levels` and `changes` steps and noise, `plausibility` wrong unit or rate.
+`raw_flaws`, `time_flaws` and `wording` put them into words.
 """

@@ -18,6 +18,8 @@ TIMES = 3.0
 LEAST = 50
 LEAST_SHARE = 0.01
 """Least share of copies; fewer are left to the search for runs."""
+DEAD_BAND = 0.9
+"""Share of the repeats at one value from which on small values are cut off, not samples held."""
 PART = 1024
 """Number of differences that are judged together."""
 STRIDE = 17
@@ -38,6 +40,8 @@ class Copies:
         self._proven = np.zeros(channels, np.int64)
         """Repeats in stretches whose changes rule out repeats by chance."""
         self._looked = 0
+        self.at_one_value: dict[int, float] = {}
+        """Value by column at which nearly all repeats of the first piece stand: a dead band's."""
         self._pieces = 0
 
     def add(self, d: Samples, resolution: Array) -> None:
@@ -54,6 +58,15 @@ class Copies:
         parts = max(1, some.shape[1] // PART)
         for part in np.array_split(some, parts, axis=1):
             self._count(part, step)
+
+    def note_values(self, x: Samples, same: NDArray[np.bool_]) -> None:
+        """Take in the samples of the first piece, (channels, n), and the mask of those that repeat the one before."""
+        for c, row in enumerate(same):
+            held = x[c, x.shape[1] - len(row) :][row]
+            if len(held) >= LEAST:
+                middle = float(np.sort(held)[len(held) // 2])
+                if np.count_nonzero(held == middle) > DEAD_BAND * len(held):
+                    self.at_one_value[c] = middle
 
     def _count(self, some: Array, step: Array) -> None:
         """Count a stretch that is short enough for a channel's noise to be constant in it."""

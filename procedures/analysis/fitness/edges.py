@@ -1,6 +1,7 @@
 """Saturation of a channel: samples pile up at its largest or its smallest value."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ CHANCE = 1e-10
 """Accepted probability of a false alarm at one edge."""
 RAILS = frozenset((2**15 - 1, -(2**15), 2**16 - 1, 2**23 - 1, -(2**23), 2**24 - 1, 2**31 - 1, -(2**31)))
 """Ends of the range of converters of 16, 24 and 32 bits, signed and unsigned."""
+FAR = 3.0
+ROUNDING = 1e-9
+"""Difference of two levels relative to the largest value, below which they are one."""
 FEW = 64
 """Counts that a piece may span to be sorted by counting."""
 
@@ -57,6 +61,12 @@ class Edge:
         """Greatest number of samples at any of the next three levels."""
         return max(list(self.levels.values())[1:4], default=0)
 
+    @property
+    def is_far(self) -> bool:
+        """True if the outermost level is farther from the next one than that from all others kept."""
+        levels = list(self.levels)
+        return len(levels) > NEIGHBOURS and abs(levels[1] - levels[0]) > FAR * abs(levels[-1] - levels[1])
+
     def add(self, x: Samples, extreme: float, same: Mask, start: int, few: Levels | None) -> None:
         """Add samples (n,) from index `start`, with the outermost of them, `extreme`.
 
@@ -82,15 +92,30 @@ class Edge:
         former holds at most ``STEEPEST/(1 + STEEPEST)``, and of all levels that are kept `ALONE`, binomial.
         `repeats`: exact repeats in the whole channel.
         """
-        if len(self.levels) <= NEIGHBOURS:
+        counts = self._apart(max(abs(self.extreme), abs(other.extreme)))
+        if len(counts) <= NEIGHBOURS:
             return False
-        outermost, next_one, *behind = list(self.levels.values())[:4]
+        outermost, next_one, *behind = counts[:4]
         inside = count - outermost - other.count
         if repeats - self.pairs - other.pairs > BUSY * inside or next_one > CLIFF * max(behind):
             return False
         steep = _at_least(outermost, outermost + self.near, STEEPEST / (1.0 + STEEPEST))
         alone = _at_least(outermost, sum(self.levels.values()), ALONE)
         return bool(min(steep, alone) < CHANCE)
+
+    def _apart(self, size: float) -> list[int]:
+        """Numbers of samples by level, levels that only rounding parts as one: pulses times their weight."""
+        levels, counts = list(self.levels), list(self.levels.values())
+        parted = [abs(a - b) > ROUNDING * size for a, b in pairwise(levels)]
+        if all(parted):
+            return counts
+        found = counts[:1]
+        for is_new, count in zip(parted, counts[1:], strict=True):
+            if is_new:
+                found.append(count)
+            else:
+                found[-1] += count
+        return found
 
     def _merge(self, found: Levels) -> None:
         """Merge ascending levels that are complete as far inward as the kept ones reach."""

@@ -35,6 +35,8 @@ class Kind(StrEnum):
     UNLIKELY_RATE = "unlikely_rate"
     STANDS_STILL = "stands_still"
     COPIED = "copied"
+    TWIN = "twin"
+    EVEN_STEPS = "even_steps"
     WRAPPED = "wrapped"
     NOISE_CHANGE = "noise_change"
 

@@ -18,6 +18,7 @@ BURSTS = 8
 TOLERANCE = 0.3
 """Relative tolerance of gravity's magnitude: nominal scales are known to some per cent, but the thesis's own unit (its
 table 5.1) gives 0.81 … 0.86 of its input; the nearest wrong unit, feet, is a factor of 3.3 away."""
+MOST = 1.0 + TOLERANCE
 COLDEST_C, HOTTEST_C = -100.0, 200.0
 FACTORS = (2.0, 4.0, 5.0)
 """Simple factors of a wrong rate, of a wrong number of summed samples, or of a range set otherwise than declared."""
@@ -31,6 +32,19 @@ radians make 17 deg/√h and more of ordinary ones."""
 SLOWEST_HZ, FASTEST_HZ = 0.5, 40_000.0
 """Rates of inertial units; the fastest MEMS send 32 000 samples a second."""
 GYRO_QUANTITIES = (Quantity.ANGLE_INCREMENT, Quantity.ANGULAR_RATE)
+FORCE_QUANTITIES = (Quantity.VELOCITY_INCREMENT, Quantity.SPECIFIC_FORCE)
+_FORCES = {
+    "g": 1.0 / units.STANDARD_GRAVITY,
+    "mg": 1e3 / units.STANDARD_GRAVITY,
+    "µg": 1e6 / units.STANDARD_GRAVITY,
+    "cm/s² (Gal)": 100.0,
+    "mm/s², or mg declared as g": 1000.0,
+    "a value divided by 1000": 1e-3,
+    "a value in m/s² multiplied by 9.81 once more": units.STANDARD_GRAVITY,
+    "a value multiplied by 57.3, degrees a radian": 1.0 / units.DEG,
+    "a value divided by 57.3, degrees a radian": units.DEG,
+}
+"""Readings of gravity [m/s²] in another unit, in parts of gravity."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +107,10 @@ class Readings:
 
     def _accelerometers(self, settings: FitnessSettings) -> dict[str, Doubt]:
         rows = self._triads.get("accelerometer")
-        if rows is None or not settings.reads_gravity:
+        if not settings.reads_gravity:
             return {}
+        if rows is None:
+            return self._single_accelerometers(settings)
         gravity = settings.gravity_m_s2 or units.STANDARD_GRAVITY
         read = self._magnitudes["accelerometer"] / self._pieces
         if abs(read / gravity - 1.0) <= TOLERANCE:
@@ -102,18 +118,19 @@ class Readings:
         factor = _factor(read / gravity)
         if factor is not None:
             return self._by_factor(rows, read, gravity, factor)
-        candidates = {
-            "g": 1.0 / units.STANDARD_GRAVITY,
-            "mg": 1e3 / units.STANDARD_GRAVITY,
-            "µg": 1e6 / units.STANDARD_GRAVITY,
-            "cm/s² (Gal)": 100.0,
-            "mm/s²": 1000.0,
-            "a value divided by 1000": 1e-3,
-            "a value in m/s² multiplied by 9.81 once more": units.STANDARD_GRAVITY,
-            "a value multiplied by 57.3, degrees a radian": 1.0 / units.DEG,
-            "a value divided by 57.3, degrees a radian": units.DEG,
-        }
-        return self._told(rows, ACCELEROMETER, read, f"gravity, {gravity:.5g} m/s² ± 30 %", gravity, candidates)
+        return self._told(rows, ACCELEROMETER, read, f"gravity, {gravity:.5g} m/s² ± 30 %", gravity, _FORCES)
+
+    def _single_accelerometers(self, settings: FitnessSettings) -> dict[str, Doubt]:
+        """Accelerometers without a whole triad: none of them reads more than gravity, whichever way it points."""
+        gravity = settings.gravity_m_s2 or units.STANDARD_GRAVITY
+        expected = f"at most gravity, {gravity:.5g} m/s² + 30 %,"
+        found: dict[str, Doubt] = {}
+        for i, (channel, total) in enumerate(zip(self._channels, self._sums, strict=True)):
+            read = abs(float(total)) / self._pieces
+            if channel.quantity in FORCE_QUANTITIES and channel.rate_unit == "m/s^2" and read > MOST * gravity:
+                larger = {name: size for name, size in _FORCES.items() if size > 1.0}
+                found.update(self._told((i,), (channel.name,), read, expected, gravity, larger))
+        return found
 
     def _by_factor(self, rows: Sequence[int], read: float, gravity: float, factor: float) -> dict[str, Doubt]:
         """Accelerometers that read a simple multiple of gravity: the rate of increments, or the range of samples."""

@@ -1,11 +1,26 @@
 """Findings on raw values: missing ones, a constant channel, ends of ranges, bits, wraps."""
 
+from collections.abc import Sequence
+from math import gcd
+
 from procedures.analysis.fitness.bits import Bits
 from procedures.analysis.fitness.edges import RAILS, Edge
 from procedures.analysis.fitness.findings import Finding, FitnessSettings, Kind, Severity
-from procedures.analysis.fitness.wording import Wording
+from procedures.analysis.fitness.wording import Wording, amount, gain_of
 from procedures.analysis.fitness.wraps import Wrap
 from procedures.core.recording import AROUND, INCREMENTS, Channel
+
+MOST_CHANGES, SAMPLES_OF_CHANGE = 5, 200
+"""Most changes of a channel that gives no signal, and fewest samples for each of them: fewer samples of a coarse
+channel may well be as quiet."""
+SAME_RATIO = 1e-5
+WITHOUT_GAPS = (
+    "; ways out: a stretch without them (start_s and stop_s), or an Allan deviation that leaves gaps out (gaps)"
+)
+LEAST_LEVELS = 24
+"""Fewest outermost levels whose counts show a repetition: by chance all are even once in 2^24."""
+GREATEST_VALUE, LEAST_SPREAD = 1e18, 1e-24
+"""Bounds of values and of their variation [SI], far from those of any sensor."""
 
 
 def length(name: str, seen: int, announced: int | None, settings: FitnessSettings) -> list[Finding]:
@@ -25,7 +40,9 @@ def missing(name: str, count: int, first: int, words: Wording, settings: Fitness
     if not count:
         return []
     severity = Severity.REFUSE if settings.gaps == "refuse" else Severity.WARN
-    treated = "" if severity is Severity.REFUSE else "; they are left out as gaps"
+    treated = "; they are left out as gaps"
+    if severity is Severity.REFUSE:
+        treated = WITHOUT_GAPS if count < words.seen else "; leave the channel out (channels), or import it anew"
     told = (
         f"channel {name}: {words.share(count)} {'are' if count > 1 else 'is'} not a finite number, "
         f"the first is sample {words.at(first)}{treated}"
@@ -57,6 +74,77 @@ def constant(
     return [Finding(Kind.CONSTANT, severity, told, 0, words.seen)]
 
 
+def beyond_reason(channel: Channel, low: float, high: float, words: Wording) -> list[Finding]:
+    """Return the finding on values that no unit makes something of: squares of them overflow, or vanish."""
+    size = abs(gain_of(channel, words.rate_hz))
+    most, spread = max(abs(low), abs(high)) * size, (high * 0.5 - low * 0.5) * size * 2.0
+    if most <= GREATEST_VALUE and spread >= LEAST_SPREAD:
+        return []
+    value = f"reads up to {most:.3g}" if most > GREATEST_VALUE else f"varies by {spread:.3g}"
+    told = (
+        f"channel {channel.name} {value} {channel.rate_unit} where {LEAST_SPREAD:g} … {GREATEST_VALUE:g} is the widest "
+        "range of any sensor: its unit or its scale is wrong"
+    )
+    return [Finding(Kind.WRONG_UNIT, Severity.REFUSE, told, 0, words.seen)]
+
+
+def repeats_itself(edges: Sequence[tuple[Edge, Edge]], words: Wording, settings: FitnessSettings) -> list[Finding]:
+    """Return the finding on a recording that holds itself more than once: each of its outermost levels then occurs
+    once, twice, … as often as in one part. `edges` of the channels that are samples of sensors.
+    """
+    counts = [count for pair in edges for edge in pair for count in edge.levels.values()]
+    times = gcd(*counts) if len(counts) >= LEAST_LEVELS else 1
+    if times < 2:
+        return []
+    one_s = words.seen / words.rate_hz / times
+    told = (
+        f"the recording seems to hold itself {times} times: every largest and smallest value of all channels occurs "
+        f"{times} times or a multiple of it; was a file joined with itself? One part is {one_s:.6g} s long (stop_s)"
+    )
+    severity = Severity.WARN if settings.means_only else Severity.REFUSE
+    return [Finding(Kind.REPEATED, severity, told, 0, words.seen, of_row=True)]
+
+
+def is_dead(channel: Channel, changes: int, seen: int, is_integer: bool, settings: FitnessSettings) -> bool:
+    """Return whether a channel changes so rarely that it gives no signal between: not a counter, nor a short dwell."""
+    rests = channel.quantity in AROUND or (is_integer and channel.quantity in INCREMENTS) or settings.beside_others
+    return not rests and 0 < changes <= MOST_CHANGES and seen >= SAMPLES_OF_CHANGE * changes
+
+
+def dead(
+    channel: Channel, values: tuple[float, float], changes: int, first_index: int, words: Wording
+) -> list[Finding]:
+    """Return the finding on a channel that stands still but for a few changes; `values`: its least and greatest."""
+    times = "one change" if changes == 1 else f"{changes} changes"
+    told = (
+        f"channel {channel.name}: the channel stands still but for {times} within {values[0]:.9g} … {values[1]:.9g}, "
+        f"the first at sample {words.at(first_index)}, in all {words.seen} samples; a live channel shows noise"
+    )
+    return [Finding(Kind.CONSTANT, Severity.REFUSE, told, first_index, words.seen)]
+
+
+def twin(channel: Channel, of: Channel, ratio: float, words: Wording) -> Finding:
+    """Return the finding on a channel that repeats another one; `ratio` of their changes in raw units."""
+    if channel.rate_unit == of.rate_unit:
+        ratio *= gain_of(channel, words.rate_hz) / gain_of(of, words.rate_hz)
+    factor = "" if abs(ratio - 1.0) < SAME_RATIO else " negated" if abs(ratio + 1.0) < SAME_RATIO else f" × {ratio:.6g}"
+    told = (
+        f"channel {channel.name} repeats channel {of.name}{factor} sample by sample: two sensors never agree so, one "
+        "of the two columns holds the other's values"
+    )
+    return Finding(Kind.TWIN, Severity.WARN, told, 0, words.seen)
+
+
+def grows_evenly(channel: Channel, step: float, words: Wording) -> Finding:
+    """Return the finding on a channel that changes by the same amount, `step` raw, from sample to sample."""
+    grows = "grows" if step > 0.0 else "falls"
+    told = (
+        f"channel {channel.name} {grows} by {amount(channel, words.rate_hz, abs(step))} from each sample to the next: "
+        "a counter or a clock does so, a sensor at rest shows noise; is this the right column?"
+    )
+    return Finding(Kind.EVEN_STEPS, Severity.REFUSE, told, 0, words.seen)
+
+
 def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: int, words: Wording) -> list[Finding]:
     """Return findings on samples that pile up at the largest or smallest value, or at the end of a converter's
     range.
@@ -74,6 +162,8 @@ def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: in
             )
         elif edge.piles_up(repeats, words.seen, other):
             told = f"{begin}the {word}, and no more than {edge.near} at any of the next three values"
+            zeros = "zeros seem to stand for lost samples, which NaN marks; or "
+            end = end.replace("; ", f"; {zeros}", 1) if value == 0.0 and edge.is_far else end
             found.append(Finding(Kind.SATURATED, Severity.REFUSE, f"{told}{end}", edge.first_index, count))
     return found
 

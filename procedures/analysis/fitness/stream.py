@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from procedures.analysis.fitness import raw_flaws, time_flaws
 from procedures.analysis.fitness.bits import Bits
 from procedures.analysis.fitness.copies import Copies
+from procedures.analysis.fitness.counters import Counters
 from procedures.analysis.fitness.edges import Edge, counted
 from procedures.analysis.fitness.findings import ChannelFitness, Finding, FitnessSettings, Kind, Severity
 from procedures.analysis.fitness.jumps import WHITE, Jump, Jumps
@@ -17,13 +18,16 @@ from procedures.analysis.fitness.pieces import Mask, Piece, Pieces, Samples
 from procedures.analysis.fitness.plausibility import Readings, unlikely_rate
 from procedures.analysis.fitness.repeats import Repeats
 from procedures.analysis.fitness.stalls import Stalls
+from procedures.analysis.fitness.twins import Twins
 from procedures.analysis.fitness.wording import Wording
 from procedures.analysis.fitness.wraps import Wraps
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 from procedures.core.recording import AROUND, INCREMENTS, TRIADS, Channel, RawArray, Recording
 
-_SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
+_SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT, Kind.EVEN_STEPS)
+
+_FALSIFIES = (Kind.WRAPPED, Kind.CONSTANT, Kind.EVEN_STEPS, Kind.WRONG_UNIT)
 
 FEW_SHARE = 1e-3
 """Greatest share of outliers for which a result without them still represents the channel."""
@@ -53,27 +57,36 @@ class FitnessStream:
         self._repeats = Repeats(number)
         self._stalls = Stalls(_groups(self._channels), number)
         self._copies = Copies(number)
+        self._twins = Twins(self._channels)
+        self._counters = Counters()
         self._jumps = Jumps(number)
         self._levels = Levels(number, count)
         self._wraps = Wraps([c.scale if c.unit == "degC" else None for c in self._channels])
         self._readings = Readings(self._channels, rate_hz)
+        self._first_change = [-1] * number
         self._missing = np.zeros(number, np.int64)
         self._first_missing = [0] * number
         self._is_integer = False
 
     def add(self, block: RawArray) -> None:
         """Inspect the next samples, shape (n, channels), int32 or float64. Raises `BadParameter` for another shape."""
-        for piece in self._pieces.add(block):
-            self._inspect(piece)
+        with np.errstate(over="ignore", invalid="ignore"):  # of absurd values, which are refused at the end
+            for piece in self._pieces.add(block):
+                self._inspect(piece)
 
     def finish(self) -> tuple[ChannelFitness, ...]:
         """Return the findings, channel by channel; no block may follow."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._findings()
+
+    def _findings(self) -> tuple[ChannelFitness, ...]:
         for piece in self._pieces.finish():
             self._inspect(piece)
         words = Wording(self._pieces.seen, self._rate_hz)
         found = [self._of_values(c, channel, words) for c, channel in enumerate(self._channels)]
         if words.seen >= max(self._settings.least_samples, 2):
             self._of_repeats(found, words)
+            self._of_pretenders(found, words)
             self._of_readings(found, words)
             if self._settings.at_rest:
                 self._of_course(found, words)
@@ -101,10 +114,18 @@ class FitnessStream:
                 self._count_missing(piece.missing, start)
             self._extremes(x, same, start)
             zeros = np.array([np.count_nonzero(row) for row in same], np.int64)
-            self._repeats.add(same, zeros, start + x.shape[1] - same.shape[1])
-            self._stalls.add(same, zeros, start + x.shape[1] - same.shape[1])
+            first = start + x.shape[1] - same.shape[1]
+            for c in np.flatnonzero(zeros < same.shape[1]).tolist():
+                if self._first_change[c] < 0:
+                    self._first_change[c] = first + int(np.argmin(same[c]))
+            self._repeats.add(same, zeros, first)
+            self._stalls.add(same, zeros, first)
             resolution = self._resolution()
+            if not start:
+                self._copies.note_values(x, same)
             self._copies.add(piece.d, resolution)
+            self._twins.add(piece.d)
+            self._counters.add(piece.d)
             self._levels.add(piece)
             self._wraps.add(piece)
             self._readings.add(x)
@@ -146,6 +167,13 @@ class FitnessStream:
             return found + raw_flaws.constant(channel, edges[0].extreme, self._is_integer, words, settings)
         if words.seen < settings.least_samples or lost == words.seen:
             return found
+        beyond = raw_flaws.beyond_reason(channel, edges[1].extreme, edges[0].extreme, words)
+        if beyond:
+            return beyond
+        changes = self._repeats.pairs - int(self._repeats.zeros[c]) if not lost else words.seen
+        if raw_flaws.is_dead(channel, changes, words.seen, self._is_integer, settings):
+            values = edges[1].extreme, edges[0].extreme
+            return found + raw_flaws.dead(channel, values, changes, self._first_change[c], words)
         wrap = self._wraps.found(c, edges[1].extreme, edges[0].extreme)
         if wrap is not None:
             return found + raw_flaws.wrapped(channel, wrap, words)
@@ -184,30 +212,29 @@ class FitnessStream:
             severity = Severity.WARN if self._settings.means_only else Severity.REFUSE
             for c in held:
                 found[c].append(Finding(Kind.REPEATED, severity, told, self._repeats.first_index, rows, of_row=True))
-        for together in self._alike(copied):
+        for together in time_flaws.alike(copied, self._channels, self._repeats.zeros):
             names = [self._channels[c].name for c in together]
             repeats = int(self._repeats.zeros[together[0]])
             # A copied sample cannot have repeated by chance; some of the other samples did, and are no copies.
             repeats -= round(self._copies.by_chance(together[0]) * words.seen)
-            finding = time_flaws.copied(names, repeats, not witnesses and not held, words, self._settings)
+            value = self._copies.at_one_value.get(together[0])
+            finding = time_flaws.copied(names, repeats, not witnesses and not held, value, words, self._settings)
             for c in together:
                 found[c].append(finding)
 
-    def _alike(self, columns: Sequence[int]) -> list[list[int]]:
-        """Copied channels of one sensor, which repeat about as often."""
-        groups: list[list[int]] = []
-        for c in columns:
-            near = [g for g in groups if self._channels[g[0]].quantity is self._channels[c].quantity]
-            near = [
-                g
-                for g in near
-                if abs(self._repeats.zeros[g[0]] - self._repeats.zeros[c]) < 0.05 * self._repeats.zeros[c]
-            ]
-            if near:
-                near[0].append(c)
-            else:
-                groups.append([c])
-        return groups
+    def _of_pretenders(self, found: list[list[Finding]], words: Wording) -> None:
+        """Add findings on channels that hold no sensor's own values: another's, or a time where the unit rests."""
+        for twin in self._twins.found():
+            channel, of = self._channels[twin.column], self._channels[twin.of]
+            found[twin.column].append(raw_flaws.twin(channel, of, twin.ratio, words))
+        own = [c for c, channel in enumerate(self._channels) if channel.quantity not in AROUND and not found[c]]
+        if own and not self._missing.any() and all(2 * self._repeats.zeros[c] < self._repeats.pairs for c in own):
+            for flaw in raw_flaws.repeats_itself([self._edges[c] for c in own], words, self._settings):
+                for c in own:
+                    found[c].append(flaw)
+        for c, step in self._counters.found().items() if self._settings.at_rest else ():
+            if self._channels[c].quantity not in AROUND:
+                found[c] = [raw_flaws.grows_evenly(self._channels[c], step, words)]
 
     def _of_readings(self, found: list[list[Finding]], words: Wording) -> None:
         """Add findings on units and rates that contradict the readings of a unit at rest."""
@@ -217,7 +244,7 @@ class FitnessStream:
         doubts = self._readings.doubts(self._settings, mean, usual)
         for c, channel in enumerate(self._channels):
             doubt = doubts.get(channel.name)
-            if doubt is None or any(f.kind in (Kind.WRAPPED, Kind.CONSTANT) for f in found[c]):
+            if doubt is None or any(f.kind in _FALSIFIES for f in found[c]):
                 continue
             kind = Kind.WRONG_RATE if doubt.of_rate else Kind.WRONG_UNIT
             refused = doubt.certain and not (doubt.of_rate and self._settings.seeks_scale)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.analysis.fitness.changes import Change, changes
 from procedures.analysis.fitness.findings import Finding, FitnessSettings, Kind, Severity
@@ -138,14 +139,45 @@ def stands_still(group: Group, names: Sequence[str], words: Wording) -> Finding:
     return Finding(Kind.STANDS_STILL, severity, told, longest.first_index, total)
 
 
-def copied(names: Sequence[str], repeats: int, alone: bool, words: Wording, settings: FitnessSettings) -> Finding:
-    """Return the finding on copied channels; `alone`: no other channel moves meanwhile."""
+def alike(columns: Sequence[int], channels: Sequence[Channel], repeats: NDArray[np.int64]) -> list[list[int]]:
+    """Return copied channels by sensor: those of one quantity that repeat about as often; `repeats` (channels,)."""
+    groups: list[list[int]] = []
+    for c in columns:
+        near = [g for g in groups if channels[g[0]].quantity is channels[c].quantity]
+        near = [g for g in near if abs(repeats[g[0]] - repeats[c]) < 0.05 * repeats[c]]
+        if near:
+            near[0].append(c)
+        else:
+            groups.append([c])
+    return groups
+
+
+def copied(
+    names: Sequence[str],
+    repeats: int,
+    alone: bool,
+    value: float | None,
+    words: Wording,
+    settings: FitnessSettings,
+) -> Finding:
+    """Return the finding on copied channels; `alone`: no other channel moves meanwhile; `value`: that at which nearly
+    all repeats stand, None where they stand at many.
+    """
     rate = words.rate_hz * (1.0 - repeats / max(words.seen - 1, 1))
     who = f"channel {names[0]}" if len(names) == 1 else f"channels {names[0]} … {names[-1]}"
     begin = f"{who}: {words.share(repeats)} repeat the one before exactly"
+    severity = Severity.WARN if settings.means_only or not alone else Severity.REFUSE
+    if value is not None:
+        told = (
+            f"{begin}, nearly all of them at {value:.6g}: a dead band or a threshold cuts small changes off, and the "
+            "noise below it is not in the data; record without it"
+        )
+        return Finding(Kind.REPEATED if alone else Kind.COPIED, severity, told, 0, repeats)
     if alone:
-        told = f"{begin}: rows seem to be sent more than once, as if the true rate were {rate:.4g} Hz"
-        severity = Severity.WARN if settings.means_only else Severity.REFUSE
+        told = (
+            f"{begin}: rows seem to be sent more than once, as if the true rate were {rate:.4g} Hz, or a filter, such "
+            "as a median, holds values; record the sensor's own samples at its own rate"
+        )
         return Finding(Kind.REPEATED, severity, told, 0, repeats)
     told = (
         f"{begin} while others move: sampled at about {rate:.4g} Hz and filled up to {words.rate_hz:g} Hz by copying; "

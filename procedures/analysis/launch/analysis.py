@@ -7,6 +7,8 @@ computes everything faster than a cell from every sample after the trim; everyth
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from procedures.analysis.allan.correlated import Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, DeviationStream
 from procedures.analysis.allan.statistic import Sizes, decade_sizes
@@ -156,12 +158,22 @@ def _known(watched: Watched, gathered: _Gathered, names: tuple[str, ...]) -> _Fi
     if cells.rates.shape[1] < FEWEST_CELLS:
         raise UnfitRecording(
             f"recording {watched.info.id}: {cells.rates.shape[1]} cells of {cells.cell_s:g} s are too few for a noise "
-            f"analysis, at least {FEWEST_CELLS} are needed"
+            f"analysis, at least {FEWEST_CELLS} are needed{_shorter_cells(cells, watched.info.rate_hz)}"
         )
     warm = smooth_temperatures(cells, temperature_names(watched.info))
     sentences = {f.channel: tuple(finding.sentence for finding in f.findings) for f in found}
     coarse = gathered.coarse
     return _First(cells, {n: ChannelContext(sentences.get(n, ()), coarse.get(n, ""), warm) for n in names})
+
+
+def _shorter_cells(cells: Cells, rate_hz: float) -> str:
+    """The way out for a record that is too short: a longer one, or cells of one leading digit that give enough."""
+    longer = f": record at least {FEWEST_CELLS * cells.cell_s:g} s"
+    longest = (cells.rates.shape[1] - 1) * cells.cell_s / FEWEST_CELLS
+    if longest * rate_hz < FEWEST_A_CELL:
+        return longer
+    digit = 10.0 ** np.floor(np.log10(longest))
+    return f"{longer}, or make cell_s shorter, {np.floor(longest / digit) * digit:g} at the most"
 
 
 def _channels(task: tuple[Recording, tuple[str, ...], _First, LaunchSettings]) -> list[ChannelNoise]:

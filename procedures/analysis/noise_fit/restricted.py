@@ -78,13 +78,19 @@ def state(spectrum: Spectrum, variances: Array) -> State:
         return _impossible(s, variances)
     flat = s.gram.reshape(len(power), -1)
     weights = 1.0 / power
-    inverse = np.asarray(np.linalg.inv((weights @ flat).reshape(s.gram.shape[1:])), dtype=np.float64)
+    try:
+        inverse = np.asarray(np.linalg.inv((weights @ flat).reshape(s.gram.shape[1:])), dtype=np.float64)
+    except np.linalg.LinAlgError:  # a record without noise: its powers are those of rounding errors
+        return _impossible(s, variances)
     beta = inverse @ (weights @ s.products)
     explained = 2.0 * s.products @ beta - flat @ np.outer(beta, beta).ravel()
     squares = np.maximum(s.squares - explained, 0.0)
     dof = np.maximum(s.dof - weights * (flat @ inverse.ravel()), 1e-6 * s.dof)
     plain = -0.5 * float(np.dot(s.dof, np.log(power)) + np.dot(squares, weights))
-    restricted = plain + 0.5 * float(np.log(np.linalg.det(inverse)))
+    determinant = float(np.linalg.det(inverse))
+    if not determinant > 0.0:
+        return _impossible(s, variances)
+    restricted = plain + 0.5 * float(np.log(determinant))
     return State(variances, power, squares / dof, dof, beta, inverse, restricted, plain)
 
 
@@ -206,10 +212,19 @@ class Profile:
         for _ in range(_WIDENINGS):
             far = near + step if upwards else near * near / (near + step)
             if self.loss(far) > loss:
-                low, high = min(near, far), max(near, far)
-                return float(brentq(lambda v: self.loss(float(v)) - loss, low, high, rtol=1e-4, xtol=1e-4 * high))
+                return self._between(min(near, far), max(near, far), loss, nothing=float("inf") if upwards else 0.0)
             near, step = far, 2.0 * step
         return float("inf") if upwards else 0.0
+
+    def _between(self, low: float, high: float, loss: float, nothing: float) -> float:
+        """The variance between two whose loss equals `loss`; `nothing` where a held fit does not come back to the best.
+
+        That is so of a record without noise, whose likelihood is one of rounding errors.
+        """
+        try:
+            return float(brentq(lambda v: self.loss(float(v)) - loss, low, high, rtol=1e-4, xtol=1e-4 * high))
+        except ValueError:  # the losses at both ends are on one side
+            return nothing
 
 
 def only_where(mask: NDArray[np.bool_], spectrum: Spectrum) -> Spectrum:

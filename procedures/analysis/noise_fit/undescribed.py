@@ -21,6 +21,8 @@ FAILS = 0.05
 """Probability that a limit fails."""
 SHARE = 0.5
 """Share of the information on a coefficient whose exclusion leaves the coefficient undescribed."""
+LEAST_POWER = 1e-100
+"""Least power of a mode, in parts of the greatest: a record that repeats itself has modes without any."""
 _RAMP_OCTAVES = 2
 _SIGMAS = 2.0
 
@@ -33,7 +35,8 @@ def undescribed(agreement: Agreement, *, coarse: bool) -> tuple[int, ...]:
     holes, plain = agreement.holes, agreement.plain
     if np.any(holes):
         s = plain.spectrum
-        power = np.maximum(s.squares / s.dof, np.finfo(float).tiny)
+        power = s.squares / s.dof
+        power = np.maximum(power, LEAST_POWER * float(power.max()))
         below = plain.frequency_hz <= float(plain.frequency_hz[plain.fitted][-1])
         for k in VARIANCES:
             told = s.dof * (_column(plain, k) / power) ** 2

@@ -54,8 +54,9 @@ def correlation(
         raise UnfitRecording("a finite temperature is needed for every finite cell of the signal")
     if len(signal) < FEWEST:
         raise UnfitRecording(f"{len(signal)} cells are too short a series to judge; the least is {FEWEST}")
-    if np.ptp(signal) == 0.0 or np.ptp(temperature_c) == 0.0:
-        raise UnfitRecording("a constant series correlates with nothing")
+    for name, series in (("signal", signal), ("temperature", temperature_c)):
+        if np.ptp(series) == 0.0:
+            raise UnfitRecording(f"the {name} is constant: its means read {series[0]:.6g} all the time")
     x, y, shapes = cosines(temperature_c), cosines(signal), unit_variances(len(signal), cell_s)
     r = float(x @ y) / sqrt(float(x @ x) * float(y @ y))
     if 1.0 - r * r < 1e-12:

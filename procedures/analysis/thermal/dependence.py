@@ -172,7 +172,11 @@ def soak_fits(
             level = float(contrast @ one.values)
             found.append(SoakFit(index, means[k], below, level, sd, slope, slope_sd, order))
     if not found:
-        raise UnfitRecording(f"the temperature never stood still for {least_s:g} s: there is no soak to fit")
+        raise UnfitRecording(
+            f"the temperature never stood still for least_soak_s, {least_s:g} s: there is no soak to fit. Ways out: "
+            "soaks = false fits a temperature that moves all the time, without comparing soaks; a shorter "
+            "least_soak_s; other limits of a still temperature (regime)"
+        )
     return tuple(found)
 
 

@@ -13,6 +13,9 @@ from procedures.core.arrays import Array
 from procedures.core.converter import Normalised
 from procedures.core.errors import BadParameter, UnfitRecording
 
+NOUGHT, ROUNDING = 3.0, 1e-9
+"""A value is no reference within so many of its standard uncertainties, or so small a part of the largest value."""
+
 
 def fit_normalised(temperature_c: Array, values: Array, reference_c: float, order: int, relative: bool) -> Normalised:
     """Least squares of values (n,) at temperatures (n,) [°C] by a polynomial about the reference.
@@ -36,8 +39,13 @@ def fit_normalised(temperature_c: Array, values: Array, reference_c: float, orde
     covariance = variance * inverse @ inverse.T
     coefficients = c[1:]
     if relative:
-        if c[0] == 0.0:
-            raise UnfitRecording("the value at the reference is zero: nothing is relative to it")
+        uncertainty = float(np.sqrt(covariance[0, 0]))
+        if abs(c[0]) <= max(NOUGHT * uncertainty, ROUNDING * float(np.abs(values).max())):
+            raise UnfitRecording(
+                f"the value at the reference, {reference_c:g} °C, comes out as {c[0]:.3g} ± {uncertainty:.2g}, zero "
+                "within its uncertainty: nothing is relative to it; take absolute coefficients (relative = false), or "
+                "another reference temperature"
+            )
         jacobian = np.eye(order + 1)
         jacobian[1:, 1:] /= c[0]
         jacobian[1:, 0] = -c[1:] / c[0] ** 2
