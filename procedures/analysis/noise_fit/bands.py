@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.analysis.noise_fit.extensions import Extension, extension
+from procedures.analysis.noise_fit.extensions import Extension, extension, fast_extension
 from procedures.analysis.noise_fit.joined import Joined, joined_at
 from procedures.analysis.noise_fit.powers import Powers
 from procedures.analysis.noise_fit.restricted import State, maximum
@@ -53,12 +53,28 @@ def agreed(slow: Powers, fast: Powers | None) -> Agreement:
     base = ways[-1].joined.below(_SLOW_PART / slow.period_s) if found is None else found.joined
     model = extension(base, state or _best(base))
     if model is not None:
-        ways = tuple(replace(way, joined=model.applied(way.joined)) for way in ways)
-        found, _ = _first_that_fits(ways)
+        extended = tuple(replace(way, joined=model.applied(way.joined)) for way in ways)
+        found, _ = _first_that_fits(extended)
+    if found is None and (faster := _faster(ways[0].joined)) is not None:
+        return faster
+    if model is not None:
+        ways = extended
     if found is None:
         return replace(_cut(ways, _UNFOLDED / slow.period_s), model=model)
     text = f"At the full rate the power is not that of white reading noise and the slower processes{found.own}."
     return Agreement(found.joined, (text,) if found.own else (), ~found.joined.fitted, described=True, model=model)
+
+
+def _faster(joined: Joined) -> Agreement | None:
+    """Return all bins with an extension that acts at the full rate, if the model then fits them."""
+    found = fast_extension(joined, _best(joined))
+    if found is None:
+        return None
+    model, state = found
+    extended = model.applied(joined)
+    if misfit(extended, state) > 1.0:
+        return None
+    return Agreement(extended, (), ~extended.fitted, described=True, model=model)
 
 
 @dataclass(frozen=True)
