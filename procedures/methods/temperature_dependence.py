@@ -282,5 +282,7 @@ METHOD = Method(
     *(Params, Result, analyse, report),
     corrections=corrections,
     uses_corrections=lambda result: ("thermometers",) if result.thermometers else (),
-    inspection=lambda params, _: Inspection(replace(STATIONS.settings, least_samples=FEWEST), params.channels),
+    inspection=lambda params, _: Inspection(
+        replace(STATIONS.settings, least_samples=FEWEST), params.channels, misread_refused=True
+    ),
 )

@@ -37,6 +37,7 @@ class Kind(StrEnum):
     COPIED = "copied"
     WRAPPED = "wrapped"
     NOISE_CHANGE = "noise_change"
+    MISREAD = "misread"
 
 
 @dataclass(frozen=True)
