@@ -207,11 +207,16 @@ def _has_white(joined: Joined, state: State) -> bool:
 
 
 def nearby(model: Extension | None, joined: Joined) -> list[Extension]:
-    """Return models like a fast extension, which its uncertainty allows for; none for an extension of `candidates`."""
+    """Return models like a fast extension, which its uncertainty allows for; for others a flicker that goes on, where
+    the highest bins are not fitted.
+    """
     if model is not None and model.time_s is not None and model.spread > 0.0:
         return [model.scaled(exp(sign * _NEARBY * model.spread)) for sign in (-1.0, 0.0, 1.0)]
-    if model is None or model.corner_s is None or model.corner_s >= SHORT_CORNERS_S[0] or not np.any(joined.is_fast):
+    if not np.any(joined.is_fast):
         return []
+    if model is None or model.corner_s is None or model.corner_s >= SHORT_CORNERS_S[0]:
+        # a band that ends early may end where a flicker goes on
+        return [] if np.all(joined.fitted) else [Extension(corner_s=0.25 * SHORT_CORNERS_S[0]), Extension(corner_s=0.0)]
     longest = 2.0 * model.corner_s or SHORT_CORNERS_S[0]
     corners = _between(_LEAST_CORNER * float(np.min(joined.period_s)), min(longest, SHORT_CORNERS_S[0]), _RATIO)
     return [Extension(corner_s=t) for t in (*corners, 0.0)]
