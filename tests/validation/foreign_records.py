@@ -214,9 +214,9 @@ def fast_gauss_markov(dice: Dice) -> Record:
 def filtered_and_read(dice: Dice) -> Record:
     """White noise behind a low-pass of order 1 at 2 to 15 % of the rate, then a reader's white noise far below it."""
     n, rate = size(dice)
-    sections = butter(1, 2.0 * dice.uniform(0.02, 0.15), output="sos")
-    y = sosfilt(sections, white(dice, n + SETTLED, rate))[SETTLED:]
-    return Record(y + white(dice, n, rate, WALK * dice.uniform(0.1, 0.4)), rate, {"random_walk": WALK})
+    sections, reader = butter(1, 2.0 * dice.uniform(0.02, 0.15), output="sos"), WALK * dice.uniform(0.1, 0.4)
+    y = sosfilt(sections, white(dice, n + SETTLED, rate))[SETTLED:] + white(dice, n, rate, reader)
+    return Record(y, rate, {"random_walk": float(np.hypot(WALK, reader))})
 
 
 def coarse(*, codes: bool) -> Callable[[Dice], Record]:
