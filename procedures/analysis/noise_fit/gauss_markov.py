@@ -56,12 +56,14 @@ def like_a_filter(found: GaussMarkov, period_s: float) -> bool:
 def low_frequency_limit(joined: Joined, model: Extension, at: State) -> float:
     """Upper limit of the random walk below the corner of a fast process, ``√(N² + q²τ²)``: that of 95 %.
 
-    `at` is the fit with the process in the last column. The sum of the two powers has an uncertainty of its own.
+    `at` is the fit with the process in the last column. The sum of the two powers has an uncertainty of its own, to
+    which the correlation time contributes: the process's part goes about as τ where its fast part is given.
     """
     known = inverse_information(information(joined.used, at)[np.ix_(_PAIR, _PAIR)])
     gains = np.array([1.0, 2.0 * (model.time_s or 0.0)])
     value = float(gains @ at.variances[_PAIR])
-    return sqrt(value + ONE_SIDED * sqrt(float(gains @ known @ gains)))
+    by_time = float(gains[1] * at.variances[-1]) * model.spread
+    return sqrt(value + ONE_SIDED * sqrt(float(gains @ known @ gains) + by_time**2))
 
 
 def _at(plain: Joined, time_s: float, free: tuple[int, ...]) -> tuple[State, float]:
