@@ -42,7 +42,7 @@ def misread(seen: np.ndarray, rate_hz: float = 1.0) -> list[Finding]:
 def test_an_error_code_of_the_sensor_does_not_move_the_dependence(code: float) -> None:
     """Seen: 5.04 ± 0.014 for 5 and "independent of temperature, p = 1", for −127 °C every 100 s."""
     evidence = Evidence((recording(with_code(code, EVERY_100_S)),))
-    params = temperature_dependence.Params(soaks=False)
+    params = temperature_dependence.Params.model_validate({"soaks": False})
     result = analyse_method(temperature_dependence.METHOD, evidence, params, None)
     (channel,) = result.channels
     sd = channel.covariance[0][0] ** 0.5
@@ -58,6 +58,7 @@ def test_the_noise_analysis_does_not_use_them_either() -> None:
     evidence = Evidence((recording(seen),))
     params = noise_analysis.Params.model_validate({})
     (channel,) = analyse_method(noise_analysis.METHOD, evidence, params, None).launches[0].channels
+    assert channel.temperature is not None
     assert abs(channel.temperature.slope - SLOPE) < 4.4 * channel.temperature.standard_uncertainty
     assert abs(channel.temperatures[0].r) > 0.99
 
@@ -72,9 +73,14 @@ def test_a_sensor_that_hardly_reads_is_refused_where_its_temperature_is_needed()
     at = np.flatnonzero(np.arange(SECONDS) % 10 < 3)
     evidence = Evidence((recording(with_code(-127.0, at)),))
     with pytest.raises(UnfitRecording, match="correct the column, or analyse without this channel"):
-        analyse_method(temperature_dependence.METHOD, evidence, temperature_dependence.Params(soaks=False), None)
+        analyse_method(
+            temperature_dependence.METHOD,
+            evidence,
+            temperature_dependence.Params.model_validate({"soaks": False}),
+            None,
+        )
     short = Evidence((recording(with_code(-127.0, at)[: SECONDS // 4]),))
-    result = analyse_method(noise_analysis.METHOD, short, noise_analysis.Params(trim="none"), None)
+    result = analyse_method(noise_analysis.METHOD, short, noise_analysis.Params.model_validate({"trim": "none"}), None)
     assert any("too many to do without" in w for w in result.warnings)
 
 

@@ -175,7 +175,7 @@ class Watched:
                 mended[one.index - start, column] -= round(one.size) if whole else one.size
                 continue
             rows = np.arange(max(one.start, start), min(one.stop, stop))
-            line = one.straight(rows)
+            line = one.straight(rows.astype(np.float64))
             mended[rows - start, column] = np.rint(line) if whole else line
         return mended
 

@@ -54,15 +54,14 @@ def agreed(slow: Powers, fast: Powers | None) -> Agreement:
     found, state = _first_that_fits(ways)
     base = ways[-1].joined.below(_SLOW_PART / slow.period_s) if found is None else found.joined
     model = extension(base, state or _best(base))
+    extended = ways
     if model is not None:
         extended = tuple(replace(way, joined=model.applied(way.joined)) for way in ways)
         found, _ = _first_that_fits(extended)
     if found is None and (faster := _faster(ways[0].joined)) is not None:
         return faster
-    if model is not None:
-        ways = extended
     if found is None:
-        cut = replace(_cut(ways, _UNFOLDED / slow.period_s), model=model)
+        cut = replace(_cut(extended, _UNFOLDED / slow.period_s), model=model)
         return _faster_below_an_edge(ways[0].joined, cut) or cut
     text = f"At the full rate the power is not that of white reading noise and the slower processes{found.own}."
     return Agreement(found.joined, (text,) if found.own else (), ~found.joined.fitted, described=True, model=model)
