@@ -80,7 +80,7 @@ def claim(record: Record) -> Claim:
     try:
         result = analysed(record)
     except DomainError:
-        every: dict[str, bool] = {process: True for process in PROCESSES}
+        every: dict[str, bool] = dict.fromkeys(PROCESSES, True)
         return Claim(every, valued=False, width=np.nan, named=True, refused=True, excused=every)
     (channel,) = result.launches[0].channels
     holds: dict[str, bool] = {}
