@@ -292,5 +292,7 @@ METHOD = Method(
     corrections=corrections,
     uses_corrections=lambda result: ("thermometers",) if result.thermometers else (),
     planned_checks=lambda params, _unit, _planned: planned_tests(params, "level", f"all channels: {INDEPENDENCE}"),
-    inspection=lambda params, _: Inspection(replace(STATIONS.settings, least_samples=FEWEST), params.channels),
+    inspection=lambda params, _: Inspection(
+        replace(STATIONS.settings, least_samples=FEWEST), params.channels, misread_refused=True
+    ),
 )

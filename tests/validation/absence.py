@@ -21,7 +21,7 @@ from scipy.stats import binom
 from procedures.catalog import static_run
 from procedures.catalog.static_run import Params
 from procedures.core.recording import MemoryRecording
-from procedures.launches import ABSENCE, SLOW
+from procedures.noise_limits import ABSENCE, SLOW
 from procedures.procedure import Context
 from simulators.truth import default_bench, default_unit
 from simulators.world import WorldConfig, build

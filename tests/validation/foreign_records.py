@@ -29,6 +29,8 @@ class Record:
     temperature_c: Samples | None = None
     counts: bool = False
     """The samples are whole counts of angle."""
+    codes: bool = False
+    """The samples are whole codes of a rate."""
 
 
 def white(dice: Dice, n: int, rate_hz: float, walk: float = WALK) -> Samples:
@@ -171,16 +173,63 @@ def corner(dice: Dice) -> Record:
     return Record(y, rate, {"random_walk": WALK, "bias_instability": b})
 
 
+def hyperbola(dice: Dice) -> Record:
+    """Flicker up to half of the rate: as strong as the white noise at 0.1 Hz to a tenth of the rate."""
+    n, rate = size(dice)
+    equal_hz = np.exp(dice.uniform(np.log(0.1), np.log(0.1 * rate)))
+    b = WALK * np.sqrt(2.0 * np.pi * equal_hz)
+    y = white(dice, n, rate) + flicker(dice, n, rate, b, 0.0)
+    return Record(y, rate, {"random_walk": WALK, "bias_instability": b})
+
+
+def correlated(dice: Dice, n: int, rate_hz: float, sigma: float, time_s: float) -> Samples:
+    """Gauss–Markov process of a standard deviation and a correlation time."""
+    keep = np.exp(-1.0 / rate_hz / time_s)
+    drive = sigma * np.sqrt(1.0 - keep**2) * dice.standard_normal(n)
+    drive[0] = sigma * dice.standard_normal()
+    return lfilter([1.0], [1.0, -keep], drive)
+
+
 def gauss_markov(dice: Dice) -> Record:
     """A Gauss–Markov process of 5 to 100 s, a third to thrice the white noise of its own time."""
     n, rate = size(dice)
     time_s = float(np.exp(dice.uniform(np.log(5.0), np.log(100.0))))
     sigma = WALK / np.sqrt(time_s) * dice.uniform(0.6, 3.0)
-    keep = np.exp(-1.0 / rate / time_s)
-    drive = sigma * np.sqrt(1.0 - keep**2) * dice.standard_normal(n)
-    drive[0] = sigma * dice.standard_normal()
     truth = {"random_walk": WALK, "time_s": time_s, "driving": sigma * np.sqrt(2.0 / time_s)}
-    return Record(white(dice, n, rate) + lfilter([1.0], [1.0, -keep], drive), rate, truth)
+    return Record(white(dice, n, rate) + correlated(dice, n, rate, sigma, time_s), rate, truth)
+
+
+def fast_gauss_markov(dice: Dice) -> Record:
+    """A Gauss–Markov process of 0.03 s (3 samples at least) to 2 s; its low part is 0.5 to 10 times the white noise."""
+    n, rate = size(dice)
+    time_s = float(np.exp(dice.uniform(np.log(max(0.03, 3.0 / rate)), np.log(2.0))))
+    sigma = WALK * np.sqrt(dice.uniform(0.5, 10.0) / 2.0 / time_s)
+    return Record(
+        white(dice, n, rate) + correlated(dice, n, rate, sigma, time_s),
+        rate,
+        {"random_walk": WALK, "time_s": time_s, "driving": sigma * np.sqrt(2.0 / time_s)},
+    )
+
+
+def filtered_and_read(dice: Dice) -> Record:
+    """White noise behind a low-pass of order 1 at 2 to 15 % of the rate, then a reader's white noise far below it."""
+    n, rate = size(dice)
+    sections, reader = butter(1, 2.0 * dice.uniform(0.02, 0.15), output="sos"), WALK * dice.uniform(0.1, 0.4)
+    y = sosfilt(sections, white(dice, n + SETTLED, rate))[SETTLED:] + white(dice, n, rate, reader)
+    return Record(y, rate, {"random_walk": float(np.hypot(WALK, reader))})
+
+
+def coarse(*, codes: bool) -> Callable[[Dice], Record]:
+    """White noise of 0.02 to 0.3 of the steps that the samples are rounded to, its mean anywhere between two steps."""
+
+    def make(dice: Dice) -> Record:
+        n, rate = size(dice)
+        sd = np.exp(dice.uniform(np.log(0.02), np.log(0.3)))
+        rounded = np.rint(sd * dice.standard_normal(n) + dice.uniform(-100.0, 100.0))
+        step = 1.0 if codes else WALK * np.exp(dice.uniform(-3.0, 3.0))
+        return Record(rounded * step, rate, {"random_walk": sd * step / np.sqrt(rate)}, codes=codes)
+
+    return make
 
 
 def counter(dice: Dice) -> Record:
@@ -223,6 +272,17 @@ def warmed(dice: Dice) -> Record:
     return Record(y, rate, {"random_walk": WALK, "slope": slope}, temperature_c=seen)
 
 
+def misread(dice: Dice) -> Record:
+    """A drift that follows the temperature beside it, whose sensor sends an error code now and then."""
+    record = warmed(dice)
+    assert record.temperature_c is not None
+    seen = record.temperature_c
+    code, second = dice.choice([-127.0, 85.0, -273.15]), int(record.rate_hz)
+    for at in dice.integers(second, len(seen) - 2 * second, int(dice.integers(1, 61))):
+        seen[at : at + second] = code
+    return record
+
+
 CLEAN: dict[str, Callable[[Dice], Record]] = {
     "clean: N": clean,
     "clean: N, K": clean_walk,
@@ -239,9 +299,15 @@ FOREIGN: dict[str, Callable[[Dice], Record]] = {
     "lines, 0.7 Hz to 0.49 of the rate": lines(0.7, -0.49),
     "laboratory's air": air,
     "flicker, corner 0.3 to 30 s": corner,
-    "Gauss–Markov": gauss_markov,
+    "Gauss–Markov, 5 to 100 s": gauss_markov,
     "plain counter": counter,
     "level shift": step,
     "outliers": outliers,
     "temperature": warmed,
+    "flicker up to half of the rate": hyperbola,
+    "Gauss–Markov, 0.03 to 2 s": fast_gauss_markov,
+    "filter, then white reading noise": filtered_and_read,
+    "coarse steps as floats": coarse(codes=False),
+    "coarse codes of a rate": coarse(codes=True),
+    "temperature with error codes": misread,
 }

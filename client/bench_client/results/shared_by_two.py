@@ -361,7 +361,9 @@ class ChannelNoise(Part):
     correlated: CorrelatedProcess | None = None
     """Gauss-Markov process found in the noise; null: none"""
     flicker_corner_s: float | None = None
-    """Shortest relaxation time of the flicker, where it is not the one of the noise model [s]"""
+    """Shortest relaxation time of the flicker, where it is not the one of the noise model; 0: the flicker goes on
+    up to half of the sampling rate [s]
+    """
     temperature: TemperatureSlope | None = None
     """Dependence of the launch on temperature; null: no sensor"""
     shift: LevelShift | None = None

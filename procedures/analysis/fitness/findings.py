@@ -39,6 +39,7 @@ class Kind(StrEnum):
     EVEN_STEPS = "even_steps"
     WRAPPED = "wrapped"
     NOISE_CHANGE = "noise_change"
+    MISREAD = "misread"
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from procedures.analysis.fitness.edges import Edge, counted
 from procedures.analysis.fitness.findings import ChannelFitness, Finding, FitnessSettings, Kind, Severity
 from procedures.analysis.fitness.jumps import WHITE, Jump, Jumps
 from procedures.analysis.fitness.levels import Levels
+from procedures.analysis.fitness.misreadings import Misread, Misreadings
 from procedures.analysis.fitness.pieces import Mask, Piece, Pieces, Samples
 from procedures.analysis.fitness.plausibility import Readings, unlikely_rate
 from procedures.analysis.fitness.repeats import Repeats
@@ -64,6 +65,7 @@ class FitnessStream:
         self._wraps = Wraps([c.scale if c.unit == "degC" else None for c in self._channels])
         self._readings = Readings(self._channels, rate_hz)
         self._first_change = [-1] * number
+        self._misreadings = Misreadings(self._channels, rate_hz)
         self._missing = np.zeros(number, np.int64)
         self._first_missing = [0] * number
         self._is_integer = False
@@ -83,6 +85,7 @@ class FitnessStream:
         for piece in self._pieces.finish():
             self._inspect(piece)
         words = Wording(self._pieces.seen, self._rate_hz)
+        self._misreadings.finish(words.seen)
         found = [self._of_values(c, channel, words) for c, channel in enumerate(self._channels)]
         if words.seen >= max(self._settings.least_samples, 2):
             self._of_repeats(found, words)
@@ -97,8 +100,13 @@ class FitnessStream:
         return tuple(ChannelFitness(c.name, tuple(f)) for c, f in zip(self._channels, found, strict=True))
 
     def outliers(self) -> dict[int, list[Jump]]:
-        """Return the outliers of each column, where they are few enough to be omitted."""
-        return {c: jumps for c, jumps in enumerate(self._jumps.outliers) if jumps and self._few(c)}
+        """Return the outliers of each column, where they are few enough to be omitted; no misread temperatures."""
+        misread = self.misread()
+        return {c: jumps for c, jumps in enumerate(self._jumps.outliers) if jumps and self._few(c) and c not in misread}
+
+    def misread(self) -> dict[int, list[Misread]]:
+        """Return the runs of readings that are no temperatures of each column, where they are few enough."""
+        return self._misreadings.runs()
 
     def _few(self, c: int) -> bool:
         count = int(self._jumps.outlier_count[c])
@@ -128,6 +136,7 @@ class FitnessStream:
             self._counters.add(piece.d)
             self._levels.add(piece)
             self._wraps.add(piece)
+            self._misreadings.add(piece)
             self._readings.add(x)
         if self._settings.at_rest:
             self._jumps.add(piece, self._resolution())
@@ -175,8 +184,9 @@ class FitnessStream:
             values = edges[1].extreme, edges[0].extreme
             return found + raw_flaws.dead(channel, values, changes, self._first_change[c], words)
         wrap = self._wraps.found(c, edges[1].extreme, edges[0].extreme)
-        if wrap is not None:
+        if wrap is not None and not self._misreadings.explains(c, wrap.count):
             return found + raw_flaws.wrapped(channel, wrap, words)
+        found += self._misreadings.finding(c, settings.mends_outliers, words)
         found += raw_flaws.saturated(channel.name, edges, self._is_integer, int(self._repeats.zeros[c]), words)
         return found + (raw_flaws.coarse_bits(channel.name, self._bits[c], words.seen) if self._is_integer else [])
 
@@ -265,6 +275,8 @@ class FitnessStream:
             jumps = self._jumps
             count = int(jumps.outlier_count[c])
             mended = self._settings.mends_outliers and self._few(c)
+            if any(f.kind is Kind.MISREAD for f in found[c]):
+                continue
             found[c] += time_flaws.outliers(channel, jumps.outliers[c], count, mended, words)
             if channel.quantity not in AROUND:
                 found[c] += time_flaws.steps(channel, jumps.steps[c], level[c], cells.size, words)

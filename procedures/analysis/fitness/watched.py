@@ -4,7 +4,7 @@ The first pass over a recording's blocks also serves the inspection; a refusal a
 result. A few outliers can be mended for a second analysis.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -13,6 +13,7 @@ import numpy as np
 from procedures.analysis.fitness.findings import ChannelFitness, FitnessSettings, Kind, Severity
 from procedures.analysis.fitness.grouped import grouped
 from procedures.analysis.fitness.jumps import Jump
+from procedures.analysis.fitness.misreadings import Misread
 from procedures.analysis.fitness.stream import FitnessStream
 from procedures.core import spread
 from procedures.core.errors import UnfitRecording
@@ -21,7 +22,7 @@ from procedures.core.recording import Channel, Quantity, RawArray, Recording, Re
 A = TypeVar("A")
 R = TypeVar("R")
 
-WRONG_TEMPERATURES = (Kind.WRAPPED, Kind.WRONG_UNIT, Kind.NOT_FINITE)
+WRONG_TEMPERATURES = (Kind.WRAPPED, Kind.WRONG_UNIT, Kind.NOT_FINITE, Kind.MISREAD)
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class Inspection:
     """Channels whose findings matter to the analysis; None: all."""
     temperatures: bool = False
     """True if the analysis depends on temperatures; otherwise impossible ones only cause warnings."""
+    misread_refused: bool = False
+    """True if a thermometer with too many readings that are no temperatures is refused, whatever else it shows."""
 
     def matters(self, found: ChannelFitness, channel: Channel) -> ChannelFitness | None:
         """Return the findings of a channel as far as they matter to the analysis; None where the channel does not."""
@@ -42,7 +45,11 @@ class Inspection:
             return found if self.channels is None or channel.name in self.channels else None
         if self.temperatures:
             return found
-        wrong = (replace(f, severity=Severity.WARN) for f in found.findings if f.kind in WRONG_TEMPERATURES)
+        wrong = (
+            f if self.misread_refused and f.kind is Kind.MISREAD else replace(f, severity=Severity.WARN)
+            for f in found.findings
+            if f.kind in WRONG_TEMPERATURES
+        )
         return replace(found, findings=tuple(wrong))
 
     def of_station(self, station: Station | None) -> FitnessSettings:
@@ -62,7 +69,7 @@ class Watched:
     def __init__(self, recording: Recording, inspection: Inspection, watch: "Watch | None" = None) -> None:
         self._recording, self._inspection, self._watch = recording, inspection, watch
         self._fitness: tuple[ChannelFitness, ...] | None = None
-        self._outliers: dict[int, list[Jump]] = {}
+        self._outliers: Outliers = {}
         self._mended = False
 
     @property
@@ -128,7 +135,9 @@ class Watched:
         return bool(self._outliers)
 
     def mend(self) -> None:
-        """Replace each outlier in later passes by the mean of its two neighbours."""
+        """Replace each outlier in later passes by the mean of its two neighbours, a misread temperature by a straight
+        line.
+        """
         self._mended = True
 
     def _stream(self) -> FitnessStream:
@@ -141,7 +150,7 @@ class Watched:
         found = (self._inspection.matters(fitness, channel) for fitness, channel in pairs)
         self._fitness = tuple(f for f in found if f is not None)
         if self._inspection.settings.mends_outliers:
-            self._outliers = stream.outliers()
+            self._outliers = {**stream.outliers(), **stream.misread()}
 
     def _again(self) -> Iterator[RawArray]:
         start = 0
@@ -150,21 +159,30 @@ class Watched:
             start += len(block)
 
     def _without_outliers(self, block: RawArray, start: int) -> RawArray:
+        stop = start + len(block)
         inside = [
-            (jump.index - start, c, jump.size)
-            for c, jumps in self._outliers.items()
-            for jump in jumps
-            if start <= jump.index < start + len(block)
+            (c, one)
+            for c, found in self._outliers.items()
+            for one in found
+            if (start <= one.index < stop if isinstance(one, Jump) else one.start < stop and start < one.stop)
         ]
         if not inside:
             return block
         mended = block.copy()
-        for row, column, away in inside:
-            mended[row, column] -= round(away) if np.issubdtype(mended.dtype, np.integer) else away
+        whole = np.issubdtype(mended.dtype, np.integer)
+        for column, one in inside:
+            if isinstance(one, Jump):
+                mended[one.index - start, column] -= round(one.size) if whole else one.size
+                continue
+            rows = np.arange(max(one.start, start), min(one.stop, stop))
+            line = one.straight(rows.astype(np.float64))
+            mended[rows - start, column] = np.rint(line) if whole else line
         return mended
 
 
-Seen = tuple[tuple[ChannelFitness, ...], dict[int, list[Jump]]]
+Outliers = Mapping[int, Sequence[Jump | Misread]]
+"""Outliers and misread temperatures, by column."""
+Seen = tuple[tuple[ChannelFitness, ...], Outliers]
 """Findings and outliers of a recording's first pass."""
 
 

@@ -16,7 +16,8 @@ from procedures.analysis.cells import Cells, CellStream, cell_samples, channel_r
 from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection, Seen, Watched, each_watched
 from procedures.analysis.launch.channel import channel_noise
-from procedures.analysis.launch.context import ChannelContext, Resolution, smooth_temperatures, temperature_names
+from procedures.analysis.launch.context import ChannelContext, smooth_temperatures, temperature_names
+from procedures.analysis.launch.resolution import Coarse, Resolution
 from procedures.analysis.launch.results import ChannelNoise, LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal, clean_signal
@@ -130,7 +131,7 @@ def _either(task: tuple[bool, Watched, tuple[str, ...], LaunchSettings]) -> "_Ga
 @dataclass(frozen=True)
 class _Gathered:
     cells: Cells
-    coarse: dict[str, str]
+    coarse: dict[str, Coarse]
 
 
 def _gathered(task: tuple[Recording, tuple[str, ...], LaunchSettings]) -> _Gathered:
@@ -138,7 +139,7 @@ def _gathered(task: tuple[Recording, tuple[str, ...], LaunchSettings]) -> _Gathe
     recording, names, settings = task
     info = recording.info
     columns = [info.column(name) for name in names]
-    resolution = Resolution([info.channels[c] for c in columns])
+    resolution = Resolution([info.channels[c] for c in columns], info.rate_hz)
     everything = (*names, *temperature_names(info))
     stream = CellStream(info, everything, settings.cell_s)
 
@@ -163,7 +164,7 @@ def _known(watched: Watched, gathered: _Gathered, names: tuple[str, ...]) -> _Fi
     warm = smooth_temperatures(cells, temperature_names(watched.info))
     sentences = {f.channel: tuple(finding.sentence for finding in f.findings) for f in found}
     coarse = gathered.coarse
-    return _First(cells, {n: ChannelContext(sentences.get(n, ()), coarse.get(n, ""), warm) for n in names})
+    return _First(cells, {n: ChannelContext(sentences.get(n, ()), coarse.get(n), warm) for n in names})
 
 
 def _shorter_cells(cells: Cells, rate_hz: float) -> str:

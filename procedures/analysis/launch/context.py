@@ -1,4 +1,4 @@
-"""Context of a channel's samples: inspection findings, temperatures, and whether its noise is less than a count."""
+"""Context of a channel's samples: inspection findings, temperatures, and whether its noise is less than a step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,18 +7,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from procedures.analysis.cells import Cells
+from procedures.analysis.launch.resolution import Coarse
 from procedures.core.arrays import Array
-from procedures.core.recording import INCREMENTS, Channel, Quantity, RawArray, RecordingInfo
+from procedures.core.recording import Quantity, RecordingInfo
 
-LOOKED_AT = 200_000
-"""Number of first samples of a channel from which its resolution is judged."""
-COUNTER, CONVERTER = 0.35, 0.2
-"""Variance of samples [counts²] below which the reading error is no white noise: of a counter, of a converter.
-
-A plain counter at a constant rate has at most ¼, and ⅙ for evenly spread readings; one of independent readings with a
-triangular dither has ½. Rates converted with rounding have 1/12 in addition to their own noise: below 0.12 (0.35 of a
-count) the rounded noise depends on where between two counts the mean lies.
-"""
 _SMOOTHED_CELLS, _SMOOTHED_PART = 61, 20
 _GROUPS = 256
 
@@ -28,8 +20,8 @@ class ChannelContext:
     """Findings of the inspection, resolution and temperatures of one channel, for the fit of its noise."""
 
     findings: tuple[str, ...] = ()
-    coarse: str = ""
-    """Sentence on a noise of less than a count; empty where it is more."""
+    coarse: Coarse | None = None
+    """Step that hides the noise; None where the noise is more."""
     temperatures: dict[str, Array] = field(default_factory=dict[str, Array])
     """Cell means (n,) of each temperature channel [its unit]."""
 
@@ -70,39 +62,3 @@ def most_followed(series: Array, temperatures: dict[str, Array]) -> str | None:
         scale = float(np.sqrt(np.dot(own, own) * np.dot(other, other)))
         by_size[name] = abs(float(np.dot(own, other))) / scale if scale > 0.0 else 0.0
     return max(by_size, key=lambda name: by_size[name])
-
-
-class Resolution:
-    """Running variance of the first samples of channels that send whole counts."""
-
-    def __init__(self, channels: Sequence[Channel]) -> None:
-        self._channels = tuple(channels)
-        self._parts: list[RawArray] = []
-        self._seen = 0
-
-    def add(self, block: RawArray, columns: Sequence[int]) -> None:
-        """Take in the next samples (n, …); `columns` are the indices of the channels."""
-        if self._seen < LOOKED_AT:
-            part = block[: LOOKED_AT - self._seen][:, list(columns)]
-            self._parts.append(part)
-            self._seen += len(part)
-
-    def finish(self) -> dict[str, str]:
-        """Return a sentence for each channel whose noise is less than a count, by its name."""
-        if not self._parts or not np.issubdtype(self._parts[0].dtype, np.integer):
-            return {}
-        samples = np.concatenate(self._parts)
-        found: dict[str, str] = {}
-        for channel, row in zip(self._channels, samples.T, strict=True):
-            variance = float(np.var(row))
-            if channel.quantity in INCREMENTS and 0.0 < variance < COUNTER:
-                found[channel.name] = (
-                    f"its samples vary by {np.sqrt(variance):.2g} counts: readings of a counter without dither "
-                    "err by a sawtooth, not by white noise; of the random walk only a limit is given"
-                )
-            elif channel.quantity not in INCREMENTS and 0.0 < variance < CONVERTER:
-                found[channel.name] = (
-                    f"its samples vary by {np.sqrt(variance):.2g} counts: rounding hides most of the noise; of the "
-                    "random walk only a limit is given"
-                )
-        return found

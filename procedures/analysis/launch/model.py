@@ -1,28 +1,33 @@
 """The likelihood fit of one channel with its regressors (temperature, shift of the level), and the warnings on it."""
 
 from dataclasses import dataclass
-from math import log
+from math import log, pi, sqrt
 
 import numpy as np
 
 from procedures.analysis.cells import Cells
 from procedures.analysis.launch.context import ChannelContext, most_followed
 from procedures.analysis.launch.density import Density, density_of
+from procedures.analysis.launch.resolution import Coarse
 from procedures.analysis.launch.results import CorrelatedProcess, LevelShift, TemperatureSlope
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal
-from procedures.analysis.noise_fit.estimate import NoiseFit
+from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, QUANTIZATION, RANDOM_WALK, RATE_RANDOM_WALK
+from procedures.analysis.noise_fit.estimate import PROCESSES, NoiseFit
 from procedures.analysis.noise_fit.followed import Candidate, likeliest_shift
 from procedures.analysis.noise_fit.likelihood import fit_noise
 from procedures.analysis.noise_fit.powers import Powers, slow_powers
+from procedures.analysis.noise_fit.undescribed import Hidden
 from procedures.core.arrays import Array
-from procedures.core.units import DEVIATION_DISPLAY
+from procedures.core.units import DEVIATION_DISPLAY, NOISE_DISPLAY
 
 TEMPERATURE_LEVEL, TEMPERATURE_GAIN = 1e-3, 4.0
 """Probability that an irrelevant temperature is accepted, and the required gain over drifting noise."""
 SHIFT_LEVEL, SHIFT_GAIN = 1e-3, 2.0
 """The same for a shift of the level: a probability over all cells where it may be, a gain in excess of ln(cells)."""
 SHOWN_LINES = 5
+_RAMP = len(PROCESSES) - 1
+_WALKED = 0.81
 
 
 @dataclass(frozen=True)
@@ -64,10 +69,11 @@ class FoundNoise:
                 f"the level shifts by {s.height / size:.3g} ± {s.standard_uncertainty / size:.1g} {unit} at "
                 f"{s.at_s:.6g} s after the launch: no part of K"
             )
-        return (*found, *self._model(unit, size), *self.fit.remarks)
+        return (*found, *self._model(rate_unit), *self.fit.remarks)
 
-    def _model(self, unit: str, size: float) -> tuple[str, ...]:
+    def _model(self, rate_unit: str) -> tuple[str, ...]:
         """Sentences on the extension of the five-coefficient model."""
+        unit, size = DEVIATION_DISPLAY[rate_unit]
         g, corner = self.fit.gauss_markov, self.fit.flicker_corner_s
         found: list[str] = []
         if g is not None:
@@ -76,7 +82,16 @@ class FoundNoise:
                 f"a Gauss–Markov process is in the noise: correlation time {g.time_s:.3g}{spread} s, driving noise "
                 f"{g.driving / size:.3g} {unit}/√s"
             )
-        if corner is not None:
+        if g is not None and g.white is not None:
+            unit, size = NOISE_DISPLAY[rate_unit]["random_walk"]
+            below, above = g.low_frequency_walk / size, g.white / size
+            found.append(
+                f"below about {0.5 / pi / g.time_s:.2g} Hz the random walk is {below:.3g} {unit}, above it {above:.3g} "
+                f"{unit}: a low-pass filter followed by white reading noise looks the same"
+            )
+        if corner == 0.0:
+            found.append("the flicker goes on up to half of the sampling rate")
+        elif corner is not None:
             found.append(f"the flicker's shortest relaxation time is about {corner:.2g} s")
         return tuple(found)
 
@@ -109,7 +124,7 @@ def found_noise(
         level=settings.level,
         confidence=settings.confidence,
         candidates=candidates,
-        coarse=bool(context.coarse),
+        hidden=_hidden(context.coarse, len(series) * cell_s),
     )
     temperature, shift = None, None
     for f in fit.followed:
@@ -118,4 +133,22 @@ def found_noise(
         elif at is not None:
             begin = cells.since_launch_s + (signal.first_cell + at) * cell_s
             shift = LevelShift(begin, f.slope, f.standard_uncertainty)
-    return FoundNoise(fit, context.coarse, temperature, shift, density_of(slow, powers, settings.confidence))
+    sentence = "" if context.coarse is None else context.coarse.sentence
+    return FoundNoise(fit, sentence, temperature, shift, density_of(slow, powers, settings.confidence))
+
+
+def _hidden(coarse: Coarse | None, duration_s: float) -> Hidden | None:
+    """Return the limits of what a channel's steps hide: white noise, and slow changes of less than a step.
+
+    A flicker stays within half a step on either side; a random walk of duration T leaves a step q from its middle
+    with 95 % probability if ``K√T > 0.81·q``, since it stays with ``(4/π)·exp(−π²K²T/2q²)``; a ramp does if R·T > q.
+    """
+    if coarse is None:
+        return None
+    if coarse.step is None:
+        return Hidden({QUANTIZATION: 0.0, RANDOM_WALK: 0.0})
+    least = {QUANTIZATION: 0.0, RANDOM_WALK: coarse.most_walk}
+    if coarse.hides_slow:
+        q = coarse.step
+        least |= {BIAS_INSTABILITY: 0.5 * q, RATE_RANDOM_WALK: _WALKED * q / sqrt(duration_s), _RAMP: q / duration_s}
+    return Hidden(least)

@@ -208,7 +208,8 @@ class ChannelNoise:
     lines: tuple[SpectralLine, ...] = ()
     correlated: CorrelatedProcess | None = None
     flicker_corner_s: float | None = None
-    """Shortest relaxation time of the flicker, where it is not the one of the noise model."""
+    """Shortest relaxation time of the flicker, where it is not the one of the noise model; 0: the flicker goes on up to
+    half of the sampling rate."""
     temperature: TemperatureSlope | None = None
     shift: LevelShift | None = None
     density: Density | None = None

@@ -9,9 +9,9 @@ from math import sqrt
 
 import numpy as np
 
-from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, RATE_RANDOM_WALK
+from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, RANDOM_WALK, RATE_RANDOM_WALK
 from procedures.analysis.noise_fit.estimate import Estimate
-from procedures.analysis.noise_fit.extensions import Extension, candidates
+from procedures.analysis.noise_fit.extensions import Extension, candidates, nearby
 from procedures.analysis.noise_fit.joined import Joined
 from procedures.analysis.noise_fit.restricted import Spectrum, State, information, maximum
 from procedures.analysis.noise_fit.selection import Selection, inverse_information
@@ -62,18 +62,19 @@ def allowed_for(
     own: State,
     estimates: dict[int, Estimate],
     losses: tuple[float, float],
+    model: Extension | None = None,
 ) -> Doubt:
-    """Widen the intervals of B and K that are present; `own` is the fit of all processes with the selection's ramp.
+    """Widen the intervals of N, B and K that are present; `own` is the fit of all processes with the selection's ramp.
 
     `plain`: the bins without the columns that extend the model. `losses`: twice the loss of log likelihood at the end
     of an interval and at an upper limit. A process whose absence costs no more than an interval's end once another
     process is allowed gets an interval from zero; the limit of an unobserved process is raised where the alternative
-    model is as likely.
+    model is as likely. `model`: the extension of `joined`.
     """
     extended = joined is not plain
     if not extended and not any(k in selection.present for k in SLOW):
         return Doubt({}, None)
-    fits = _fits(plain, selection, own)
+    fits = _fits(plain, selection, own, nearby(model, plain))
     if not fits:
         return Doubt({}, None)
     top = max(own.log_likelihood, *(f.best.log_likelihood for f in fits))
@@ -84,6 +85,11 @@ def allowed_for(
         # the corner of a flicker is part of its level; another process is considered only in case of doubt
         others = fits if doubtful else [f for f in fits if f.model.corner_s is not None and k == BIAS_INSTABILITY]
         changed[k] = _wider(estimates[k], k, others, top, losses, zero=k in missing)
+    fast = model is not None and model.spread > 0.0
+    if RANDOM_WALK in selection.present and (fast or BIAS_INSTABILITY in selection.present):
+        # what another model leaves of a flicker, or of a fast process, is white noise to a fit
+        others = [f for f in fits if (f.model.time_s is not None) == fast]
+        changed[RANDOM_WALK] = _wider(estimates[RANDOM_WALK], RANDOM_WALK, others, top, losses, zero=False)
     sure = (estimates[BIAS_INSTABILITY].lower or 0.0) > 0.0
     strong = (sure and BIAS_INSTABILITY in missing) or 2.0 * (top - own.log_likelihood) >= STRONG_DOUBT
     return Doubt(changed, fits[0].model if doubtful else None, strong)
@@ -94,10 +100,10 @@ def _can_miss(k: int, fits: list[_Fit], top: float, loss: float) -> bool:
     return any(2.0 * (top - f.best.log_likelihood) <= loss and 2.0 * (top - f.without(k)) <= loss for f in fits)
 
 
-def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
-    """Fit the alternative models; return the two likeliest of each kind, the likeliest first."""
+def _fits(plain: Joined, selection: Selection, own: State, also: list[Extension]) -> list[_Fit]:
+    """Fit the alternative models, and `also` some more; return the likeliest of each kind, the likeliest first."""
     found: list[_Fit] = []
-    for model in candidates(plain, _EVERY):
+    for model in (*candidates(plain, _EVERY), *also):
         spectrum = model.applied(plain).used
         spectrum = spectrum if selection.ramp else spectrum.without_ramp
         columns = spectrum.columns.shape[1]
@@ -110,7 +116,8 @@ def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
     found.sort(key=lambda f: -f.best.log_likelihood)
     times = [f for f in found if f.model.time_s is not None]
     corners = [f for f in found if f.model.time_s is None]
-    return sorted((*times[:2], *corners[:2]), key=lambda f: -f.best.log_likelihood)
+    most = max(2, len(also))
+    return sorted((*times[:most], *corners[:most]), key=lambda f: -f.best.log_likelihood)
 
 
 def _wider(

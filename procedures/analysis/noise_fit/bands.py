@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.analysis.noise_fit.extensions import Extension, extension
+from procedures.analysis.noise_fit.extensions import Extension, extension, fast_extension
 from procedures.analysis.noise_fit.joined import Joined, joined_at
 from procedures.analysis.noise_fit.powers import Powers
 from procedures.analysis.noise_fit.restricted import State, maximum
@@ -21,6 +21,8 @@ _FEWEST_OCTAVES = 3
 _LONGEST_HOLE = 3
 """Most octaves of an excluded part with fitted octaves on both sides."""
 _ROUNDS = 3
+_GAINED = 8.0
+"""Least ratio of the top of the band that a fast extension describes to that without it."""
 _UNFOLDED = 4.0
 """Share of the cell frequency; with a band that ends above it, the cells lack less than 2 % of the noise beyond."""
 _SLOW_PART = 0.2
@@ -52,13 +54,48 @@ def agreed(slow: Powers, fast: Powers | None) -> Agreement:
     found, state = _first_that_fits(ways)
     base = ways[-1].joined.below(_SLOW_PART / slow.period_s) if found is None else found.joined
     model = extension(base, state or _best(base))
+    extended = ways
     if model is not None:
-        ways = tuple(replace(way, joined=model.applied(way.joined)) for way in ways)
-        found, _ = _first_that_fits(ways)
+        extended = tuple(replace(way, joined=model.applied(way.joined)) for way in ways)
+        found, _ = _first_that_fits(extended)
+    if found is None and (faster := _faster(ways[0].joined)) is not None:
+        return faster
     if found is None:
-        return replace(_cut(ways, _UNFOLDED / slow.period_s), model=model)
+        cut = replace(_cut(extended, _UNFOLDED / slow.period_s), model=model)
+        return _faster_below_an_edge(ways[0].joined, cut) or cut
     text = f"At the full rate the power is not that of white reading noise and the slower processes{found.own}."
     return Agreement(found.joined, (text,) if found.own else (), ~found.joined.fitted, described=True, model=model)
+
+
+def _faster(joined: Joined) -> Agreement | None:
+    """Return the fitted bins with an extension that acts at the full rate, if the model then fits them."""
+    found = fast_extension(joined, _best(joined))
+    if found is None:
+        return None
+    model, state = found
+    extended = model.applied(joined)
+    if misfit(extended, state) > 1.0:
+        return None
+    return replace(_told(extended, "", described=True), model=model)
+
+
+def _faster_below_an_edge(joined: Joined, cut: Agreement) -> Agreement | None:
+    """Return the bins below a filter's edge with such an extension, if it describes far more octaves than the `cut`.
+
+    The band is halved until it fits, then twice more: the undetected flank of a misfit exceeds what the intervals allow
+    for. A filter's edge alone leaves a cut band that is nearly as wide.
+    """
+    frequency, fitted = cut.joined.frequency_hz, cut.joined.fitted
+    top = float(frequency[fitted][-1])
+    holes = frequency[~fitted & (frequency < top)]
+    least = _GAINED * top if len(holes) == 0 else 2.0 * float(holes[-1])
+    highest = 0.5 * float(joined.frequency_hz[-1])
+    while highest >= least:
+        found = _faster(joined.below(highest))
+        if found is not None:
+            return _faster(joined.below(0.25 * highest)) or found
+        highest *= 0.5
+    return None
 
 
 @dataclass(frozen=True)

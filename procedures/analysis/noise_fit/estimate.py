@@ -59,6 +59,14 @@ class GaussMarkov:
     driving: float
     """Driving noise q [rate/√s]."""
     driving_sd: float | None
+    white: float | None = None
+    """Random walk N above the process's frequencies, where the record does not tell whether that is the channel's own
+    or a reader's behind a filter: below them it is `low_frequency_walk`."""
+
+    @property
+    def low_frequency_walk(self) -> float:
+        """Random walk of averaging times far above τ, √(N² + q²τ²) [rate·√s]."""
+        return ((self.white or 0.0) ** 2 + (self.driving * self.time_s) ** 2) ** 0.5
 
     @property
     def sd(self) -> float:

@@ -11,11 +11,11 @@ Camb. Phil. Soc. 44 (1948) 50), which cost one fit; then by likelihood ratios.
 """
 
 from dataclasses import dataclass, replace
-from math import log, pi
+from math import exp, log, pi, sqrt
 
 import numpy as np
 
-from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, RATE_RANDOM_WALK
+from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, RANDOM_WALK, RATE_RANDOM_WALK
 from procedures.analysis.noise_fit.joined import Joined
 from procedures.analysis.noise_fit.powers import FLICKER_BAND_S
 from procedures.analysis.noise_fit.restricted import State, information, maximum
@@ -34,6 +34,13 @@ GAIN_OF_TIME, GAIN_OF_CORNER = 16.0, 11.0
 """Required gain in twice the log likelihood: χ² of two and of one degree at 5e-4, for several times tried."""
 _RATIO = 2.0**0.5
 """Ratio of two successive trial times."""
+_ALIASES = 8
+_NO_CORNER, _LEAST_CORNER, _LEAST_TIME = 1e-4, 0.06, 2.0
+"""Shortest corner and correlation time that are tried, in samples: a shorter corner looks like none at all."""
+_NEARBY = 1.4
+"""Standard uncertainties of ln τ at which a second process is considered: they cost half of what an interval may."""
+_FINEST = 0.05
+"""Step of ln τ that ends the search for the correlation time of a fast process."""
 _PER_E_FOLD = 4
 _EVERY = 2
 """The first search tries every n-th time."""
@@ -47,7 +54,10 @@ class Extension:
     time_s: float | None = None
     """Correlation time of the process."""
     corner_s: float | None = None
-    """Shortest relaxation time of the flicker."""
+    """Shortest relaxation time of the flicker; 0: samples of a flicker that ends at half of the sampling rate."""
+
+    spread: float = 0.0
+    """Standard uncertainty of ln τ, where it is known."""
 
     def applied(self, joined: Joined) -> Joined:
         """Return the bins with this model's columns; the process is the last of them."""
@@ -95,7 +105,14 @@ def gauss_markov(joined: Joined, time_s: float) -> Array:
 
 
 def flicker_from(joined: Joined, corner_s: float) -> Array:
-    """Return the expected power (b,) of a flicker of unit B² with the shortest relaxation time `corner_s`."""
+    """Return the expected power (b,) of a flicker of unit B² with the shortest relaxation time `corner_s`.
+
+    With 0 the samples are those of a flicker without any power above half of the sampling rate: neither means over a
+    sample's time nor aliases.
+    """
+    if corner_s == 0.0:
+        means = flicker_from(joined, _NO_CORNER * float(np.min(joined.period_s)))
+        return np.where(joined.is_fast, means / _of_means(joined.frequency_hz * joined.period_s), means)
     count = max(2, round(_PER_E_FOLD * abs(log(corner_s / _FIRST_CORNER_S))) + 1)
     times = np.geomspace(_FIRST_CORNER_S, corner_s, count)
     weights = np.full(count, log(corner_s / _FIRST_CORNER_S) / (count - 1))
@@ -103,6 +120,14 @@ def flicker_from(joined: Joined, corner_s: float) -> Array:
     taken = sum(w * gauss_markov(joined, float(t)) for w, t in zip(weights, times, strict=True))
     column = joined.spectrum.columns[:, BIAS_INSTABILITY]
     return np.maximum(column - taken / pi, 1e-6 * column)
+
+
+def _of_means(cycles: Array) -> Array:
+    """Power of a flicker's means over a sample's time, aliases included, over that of the flicker; (b,) of cycles a
+    sample.
+    """
+    folded = cycles[:, None] + np.arange(-_ALIASES, _ALIASES + 1)
+    return np.sum(np.sinc(folded) ** 2 * cycles[:, None] / np.abs(folded), axis=1)
 
 
 def extension(joined: Joined, at: State) -> Extension | None:
@@ -121,6 +146,80 @@ def extension(joined: Joined, at: State) -> Extension | None:
         if gain > most:
             best, most = other, gain
     return best if most > (GAIN_OF_CORNER if best.time_s is None else GAIN_OF_TIME) else None
+
+
+def fast_extension(joined: Joined, plain: State) -> tuple[Extension, State] | None:
+    """Return the likeliest extension that acts at the full rate, with its fit, or None where none is likelier.
+
+    A flicker that goes on above the frequencies of `core.noise` up to half of the sampling rate, or a Gauss–Markov
+    process faster than those of `candidates`. `plain` is the fit of all five processes. White noise behind a low-pass
+    filter is no such process: without white noise above it, a Gauss–Markov process is not considered.
+    """
+    if not np.any(joined.is_fast):
+        return None
+    tried: dict[float, tuple[float, Extension, State]] = {}
+
+    def fit(one: Extension) -> float:
+        key = one.time_s or -(one.corner_s or 0.0)
+        if key not in tried:
+            extended = one.applied(joined).used
+            state = maximum(extended, range(extended.columns.shape[1]))
+            tried[key] = 2.0 * (state.log_likelihood - plain.log_likelihood), one, state
+        return tried[key][0]
+
+    best = max(_fast_candidates(joined), key=fit)
+    step = log(_RATIO)
+    while best.corner_s != 0.0:
+        other = max((best.scaled(exp(sign * step)) for sign in (-1.0, 1.0)), key=fit)
+        if fit(other) > fit(best):
+            best = other
+        elif best.time_s is None or step < _FINEST:
+            break
+        else:
+            step /= 3.0
+    gain, _, state = tried[best.time_s or -(best.corner_s or 0.0)]
+    if best.time_s is None:
+        return (best, state) if gain > GAIN_OF_CORNER else None
+    if gain < GAIN_OF_TIME or not _has_white(best.applied(joined), state):
+        return None
+    bend = (fit(best.scaled(exp(-step))) - 2.0 * gain + fit(best.scaled(exp(step)))) / step**2
+    return replace(best, spread=sqrt(-2.0 / bend) if bend < 0.0 else 0.0), state
+
+
+def _fast_candidates(joined: Joined) -> list[Extension]:
+    """Corners from the shortest of `candidates` down to a part of a sample, and correlation times up to theirs."""
+    period = float(np.min(joined.period_s))
+    corners = _between(_LEAST_CORNER * period, SHORT_CORNERS_S[0])
+    times = _between(_LEAST_TIME * period, SHORTEST_S)
+    return [*(Extension(corner_s=t) for t in (*corners, 0.0)), *(Extension(time_s=t) for t in times)]
+
+
+def _between(shortest: float, longest: float, ratio: float = 2.0) -> list[float]:
+    """Times from `longest` down to `shortest`, each in a ratio to the one before."""
+    return [longest * ratio**-k for k in range(int(log(max(longest / shortest, 1.0)) / log(ratio)) + 1)]
+
+
+def _has_white(joined: Joined, state: State) -> bool:
+    """Return whether the fit needs white noise in addition to a fast Gauss–Markov process."""
+    others = [k for k in range(joined.spectrum.columns.shape[1]) if k != RANDOM_WALK]
+    without = maximum(joined.used, others, start=state.variances)
+    return 2.0 * (state.log_likelihood - without.log_likelihood) > GAIN_OF_TIME
+
+
+def nearby(model: Extension | None, joined: Joined) -> list[Extension]:
+    """Return models like a fast extension, which its uncertainty allows for; for others a flicker that goes on, where
+    the highest bins are not fitted.
+    """
+    if model is not None and model.time_s is not None and model.spread > 0.0:
+        return [model.scaled(exp(sign * _NEARBY * model.spread)) for sign in (-1.0, 0.0, 1.0)]
+    if not np.any(joined.is_fast):
+        return []
+    if model is None or model.corner_s is None or model.corner_s >= SHORT_CORNERS_S[0]:
+        # a band that ends early may end where a flicker goes on
+        return [] if np.all(joined.fitted) else [Extension(corner_s=0.25 * SHORT_CORNERS_S[0]), Extension(corner_s=0.0)]
+    longest = 2.0 * model.corner_s or SHORT_CORNERS_S[0]
+    corners = _between(_LEAST_CORNER * float(np.min(joined.period_s)), min(longest, SHORT_CORNERS_S[0]), _RATIO)
+    return [Extension(corner_s=t) for t in (*corners, 0.0)]
 
 
 def candidates(joined: Joined, every: int = 1) -> list[Extension]:

@@ -4,13 +4,18 @@ from math import log, sqrt
 
 import numpy as np
 
+from procedures.analysis.noise_fit.columns import RANDOM_WALK
 from procedures.analysis.noise_fit.estimate import GaussMarkov
 from procedures.analysis.noise_fit.extensions import Extension
 from procedures.analysis.noise_fit.joined import Joined
 from procedures.analysis.noise_fit.restricted import State, information, maximum
 from procedures.analysis.noise_fit.selection import inverse_information
 
+FILTER_S, FILTER_SAMPLES = 0.25, 8.5
+"""Correlation time below which a low-pass filter of a unit may as well be the cause: 0.64 Hz, or 2 % of the rate."""
+ONE_SIDED = 1.645
 _RATIO = 2.0**0.5
+_PAIR = [RANDOM_WALK, -1]
 
 
 def gauss_markov(plain: Joined, model: Extension, free: tuple[int, ...]) -> GaussMarkov | None:
@@ -38,6 +43,27 @@ def gauss_markov(plain: Joined, model: Extension, free: tuple[int, ...]) -> Gaus
     driving = drivings[1] + slope * moved
     time_s = model.time_s * float(np.exp(moved))
     return GaussMarkov(time_s, time_s * sd, driving, sqrt((0.5 * relative * driving) ** 2 + (slope * sd) ** 2))
+
+
+def like_a_filter(found: GaussMarkov, period_s: float) -> bool:
+    """Return whether a process is so fast that white noise behind a filter, then a reader's white noise, looks alike.
+
+    `period_s`: sampling period of the record.
+    """
+    return found.time_s < max(FILTER_S, FILTER_SAMPLES * period_s)
+
+
+def low_frequency_limit(joined: Joined, model: Extension, at: State) -> float:
+    """Upper limit of the random walk below the corner of a fast process, ``√(N² + q²τ²)``: that of 95 %.
+
+    `at` is the fit with the process in the last column. The sum of the two powers has an uncertainty of its own, to
+    which the correlation time contributes: the process's part goes about as τ where its fast part is given.
+    """
+    known = inverse_information(information(joined.used, at)[np.ix_(_PAIR, _PAIR)])
+    gains = np.array([1.0, 2.0 * (model.time_s or 0.0)])
+    value = float(gains @ at.variances[_PAIR])
+    by_time = float(gains[1] * at.variances[-1]) * model.spread
+    return sqrt(value + ONE_SIDED * sqrt(float(gains @ known @ gains) + by_time**2))
 
 
 def _at(plain: Joined, time_s: float, free: tuple[int, ...]) -> tuple[State, float]:

@@ -14,14 +14,15 @@ from scipy.special import chdtri
 
 from procedures.analysis.noise_fit.alternatives import Doubt, allowed_for
 from procedures.analysis.noise_fit.bands import Agreement, agreed
+from procedures.analysis.noise_fit.columns import RANDOM_WALK
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
 from procedures.analysis.noise_fit.followed import Candidate, followed
-from procedures.analysis.noise_fit.gauss_markov import gauss_markov
+from procedures.analysis.noise_fit.gauss_markov import gauss_markov, like_a_filter, low_frequency_limit
 from procedures.analysis.noise_fit.lines import SpectralLine
 from procedures.analysis.noise_fit.powers import Powers
 from procedures.analysis.noise_fit.restricted import Profile, Spectrum, State, information, maximum
 from procedures.analysis.noise_fit.selection import VARIANCES, Selection, inverse_information, select
-from procedures.analysis.noise_fit.undescribed import limited, undescribed
+from procedures.analysis.noise_fit.undescribed import NOTHING, Hidden, bounded, limited, undescribed
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 
@@ -43,12 +44,12 @@ def fit_noise(
     level: float = 0.01,
     confidence: float = 0.95,
     candidates: Sequence[Candidate] = (),
-    coarse: bool = False,
+    hidden: Hidden | None = None,
 ) -> NoiseFit:
     """Estimate Q, N, B, K, R of one channel from its slow powers and, where given, its fast powers.
 
-    `level`: the probability of reporting an absent process as present; `confidence`: that of the intervals; `coarse`:
-    the noise is less than a count, so that the reading error is no white noise.
+    `level`: the probability of reporting an absent process as present; `confidence`: that of the intervals; `hidden`:
+    the processes that the steps of the samples hide.
     `candidates`: the conditions under which each further regressor of the slow powers is kept.
     The fast powers are used from their first frequency up, the slow ones below. Where they disagree with the
     model (chi-square per octave, see `bands`), the reading noise at the full rate is not white: the slow
@@ -66,8 +67,15 @@ def fit_noise(
     joined, model = agreement.joined, agreement.model
     selection = select(joined.used, level)
     estimates, doubt = _estimates(agreement, selection, confidence)
-    left = undescribed(agreement, coarse=coarse)
-    estimates = limited(agreement, estimates, left)
+    left = undescribed(agreement, hidden or NOTHING)
+    estimates = limited(agreement, estimates, left, hidden or NOTHING)
+    process = None if model is None else gauss_markov(agreement.plain, model, selection.free)
+    fastest = float(np.min(joined.period_s))
+    if model and process and like_a_filter(process, fastest) and estimates[RANDOM_WALK].described:
+        process = replace(process, white=estimates[RANDOM_WALK].value)
+        most = low_frequency_limit(joined, model, selection.best)
+        estimates = tuple(bounded(e, most) if k == RANDOM_WALK else e for k, e in enumerate(estimates))
+        left = tuple(sorted({*left, RANDOM_WALK}))
     correlated, correlation = _correlation(selection, left)
     octaves = joined.octaves(selection.best.variances, selection.best.amplitudes, selection.ramp)
     fitted = joined.frequency_hz[joined.fitted]
@@ -84,7 +92,7 @@ def fit_noise(
         remarks=(*agreement.remarks, *_left(left), *(_doubts(doubt) if doubt.strong else ())),
         notes=(*_remarks(selection), *(() if doubt.strong else _doubts(doubt))),
         followed=follows,
-        gauss_markov=None if model is None else gauss_markov(agreement.plain, model, selection.free),
+        gauss_markov=process,
         flicker_corner_s=None if model is None else model.corner_s,
     )
 
@@ -113,7 +121,9 @@ def _estimates(agreement: Agreement, selection: Selection, confidence: float) ->
         else:
             limit = Profile(spectrum, everything, k, full).crossing(losses[1], upwards=True, scale=full_sd[k])
             found.append(Estimate(None, None, None, None, sqrt(limit), p_value))
-    doubt = allowed_for(agreement.joined, agreement.plain, selection, own, dict(enumerate(found)), losses)
+    doubt = allowed_for(
+        agreement.joined, agreement.plain, selection, own, dict(enumerate(found)), losses, agreement.model
+    )
     found = [doubt.estimates.get(k, estimate) for k, estimate in enumerate(found)]
     return (*found, _of_ramp(selection, confidence)), doubt
 

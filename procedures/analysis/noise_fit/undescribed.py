@@ -4,14 +4,14 @@ Powers of independent processes add: whatever else is in an octave, its power is
 So ``v ≤ Σ squares/(χ²_ν(p/G)·mean column)`` in each of G octaves, p the probability that the limit fails.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 
 import numpy as np
 from scipy.special import chdtri
 
 from procedures.analysis.noise_fit.bands import Agreement
-from procedures.analysis.noise_fit.columns import QUANTIZATION, RANDOM_WALK
+from procedures.analysis.noise_fit.columns import RANDOM_WALK
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate
 from procedures.analysis.noise_fit.joined import Joined
 from procedures.analysis.noise_fit.selection import RAMP, VARIANCES
@@ -27,11 +27,22 @@ _RAMP_OCTAVES = 2
 _SIGMAS = 2.0
 
 
-def undescribed(agreement: Agreement, *, coarse: bool) -> tuple[int, ...]:
-    """Return the indices in `PROCESSES` that the fit does not describe; `coarse`: the noise is less than a count."""
+@dataclass(frozen=True)
+class Hidden:
+    """Processes that the steps of the samples hide, whatever the spectrum shows."""
+
+    least: dict[int, float]
+    """Index in `PROCESSES` → what the steps may hide of its coefficient; the limit is no less."""
+
+
+NOTHING = Hidden({})
+
+
+def undescribed(agreement: Agreement, hidden: Hidden = NOTHING) -> tuple[int, ...]:
+    """Return the indices in `PROCESSES` that the fit does not describe."""
     if not agreement.described:
         return tuple(range(len(PROCESSES)))
-    found = {QUANTIZATION, RANDOM_WALK} if coarse else set[int]()
+    found = set(hidden.least)
     holes, plain = agreement.holes, agreement.plain
     if np.any(holes):
         s = plain.spectrum
@@ -47,22 +58,20 @@ def undescribed(agreement: Agreement, *, coarse: bool) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
-def limited(agreement: Agreement, estimates: tuple[Estimate, ...], numbers: tuple[int, ...]) -> tuple[Estimate, ...]:
+def limited(
+    agreement: Agreement, estimates: tuple[Estimate, ...], numbers: tuple[int, ...], hidden: Hidden = NOTHING
+) -> tuple[Estimate, ...]:
     """Return the estimates; those in `numbers` have no value, and the limit that the octaves' power sets."""
     return tuple(
-        replace(
-            e,
-            value=None,
-            standard_uncertainty=None,
-            lower=None,
-            upper=None,
-            upper_limit=_limit(agreement.plain, i),
-            described=False,
-        )
-        if i in numbers
-        else e
+        bounded(e, max(_limit(agreement.plain, i), hidden.least.get(i, 0.0))) if i in numbers else e
         for i, e in enumerate(estimates)
     )
+
+
+def bounded(estimate: Estimate, limit: float) -> Estimate:
+    """Return an estimate as not described, with an upper limit alone."""
+    none = dict.fromkeys(("value", "standard_uncertainty", "lower", "upper"))
+    return replace(estimate, **none, upper_limit=limit, described=False)
 
 
 def _limit(plain: Joined, number: int) -> float:
