@@ -143,8 +143,9 @@ def create_app(
 ) -> FastAPI:
     """Return the FastAPI application around a service that is open; `at_end` is called when the server shuts down.
 
-    `rules`: decide which requests are let in; `proxies`: those that authenticate people; `late`: begun when the server
-    answers, it loads all routes but those of health.
+    `max_import_bytes`: size from which the files of an import are refused. `rules`: decide which requests are let in.
+    `proxies`: the reverse proxies that are trusted to authenticate people. `late`: loads all routes but those of
+    health, from the moment at which the server answers.
     """
 
     @asynccontextmanager

@@ -49,7 +49,9 @@ class Obstacle:
 
     @property
     def reason(self) -> str:
-        """The reason of a stop, whose subject is the bench."""
+        """The failures as a predicate about the bench, for the stop that stands afterwards: "could not be made safe:
+        …".
+        """
         return f"could not be made safe: {self.why}"
 
     def __str__(self) -> str:

@@ -35,7 +35,9 @@ class Observer(Protocol):
         ...
 
     def end(self, verb: str, failure: BaseException | None) -> None:
-        """Called after the device has answered, or failed to answer."""
+        """Called after the device has answered, or failed to answer. `failure`: the error of the verb, None where it
+        succeeded.
+        """
         ...
 
     def asked(self, device: str) -> None:

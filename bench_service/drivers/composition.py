@@ -50,6 +50,8 @@ def devices_of(folder: Path, bench_id: str, bench_file: Path | None = None) -> B
 
     Their state can be read whatever becomes of the file. It is read when the devices are first commanded or compared,
     and kept: a change of it holds from the process's next start.
+
+    `bench_file` None: the one that the register of `folder` remembers, if any.
     """
     register = DeviceRegister(folder, bench_id)
     file = _file_of(register, bench_file)
@@ -79,7 +81,9 @@ def _kept(path: Path) -> "BenchFile":
 
 
 def own_devices(settings: Settings) -> BenchDevices:
-    """Return the devices of the settings' own bench. Raises `Misconfigured` for a bench file that cannot be used."""
+    """Return the devices of the settings' own bench: real ones by its bench file, else simulated. Raises
+    `Misconfigured` for a bench file that cannot be used, or that has another bench's id.
+    """
     if settings.bench_file is not None:
         _require_id(_kept(settings.bench_file.absolute()).id, settings)
     return devices_of(settings.devices_in(), settings.bench_id, settings.bench_file)

@@ -8,7 +8,8 @@ from procedures.core.errors import BadParameter
 
 
 def treatment_of(stores: EvidenceStores, unit: str, corrected_by: str | None, decimate: int) -> Treatment:
-    """Return the treatment of a unit's samples by calibrations of that unit, given as ids separated by commas.
+    """Return the treatment of a unit's samples by calibrations of that unit, given as ids separated by commas (None: no
+    correction), and by means over `decimate` samples.
 
     An expired calibration may correct what was recorded while it was valid; a rejected one corrects nothing. Raises
     `NotFound`, `BadParameter`.

@@ -102,8 +102,8 @@ class JobService:
         return self._stores.queue.running(bench_id)
 
     def driving_job(self, bench_id: str) -> str | None:
-        """Return the id of the job that drives a bench now; a job whose end only waits to be written no longer drives
-        it.
+        """Return the id of the job that drives a bench now, or None; a job whose end only waits to be written no longer
+        drives it.
         """
         if self._worker is not None and self._driver is not None and self._driver.description.id == bench_id:
             driving = self._worker.running_job()

@@ -21,7 +21,9 @@ def words_in(page: bytes, leave_out_damaged: bool = False) -> tuple[StopWord, ..
 
 
 def document_in(file: int, number: int) -> dict[str, Any] | None:
-    """The document of the stop request in a record; one that is unreadable counts as damaged. Raises `OSError`."""
+    """Return the document of the stop request in a record, None for an empty record; one that is unreadable counts as
+    damaged. Raises `OSError`.
+    """
     try:
         found = read_record(file, number)
         return found if found is None else _word(found).document()

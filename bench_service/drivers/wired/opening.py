@@ -64,7 +64,8 @@ class Survey:
 
 
 def survey(file: BenchFile, kinds: Iterable[Kind] | None = None) -> Survey:
-    """Connect to the real devices at the same time, wait, and return identities, limits and readings. Commands nothing.
+    """Connect to the real devices of the `kinds` (None: all) at the same time, wait, and return identities, limits and
+    readings. Commands nothing.
 
     A device that does not answer is among the failures, with its address.
     """

@@ -23,7 +23,9 @@ NOT_SEEN = "≤: no launch showed the process; the value is the one to plan with
 
 
 def origin(record: TriadRecord | None) -> str:
-    """Return the origin of a triad's noise in the record as text: a data sheet, or a result."""
+    """Return the origin of a triad's noise in the record as text: a data sheet, or a result. None: the noise is not
+    known.
+    """
     return "nothing is known" if record is None else record.noise_origin
 
 

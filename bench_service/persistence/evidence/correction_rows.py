@@ -81,7 +81,9 @@ def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
 
 
 def retire_current(session: Session, unit: str | None, kind: str) -> None:
-    """Make the unit's current correction of that kind no longer current, in this transaction."""
+    """Make the unit's current correction of that kind no longer current, in this transaction. Without one (or for
+    `unit` None) nothing is changed.
+    """
     session.execute(
         update(CorrectionRow)
         .where(CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current)

@@ -103,7 +103,9 @@ class SqlRecordingStore:
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
     ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
-        """Yield samples, see `RecordingStore.read`; `start` and `stop` beyond the ends are taken as the ends."""
+        """Yield samples of the named channels (None: all), see `RecordingStore.read`; `start` and `stop` beyond the
+        ends are taken as the ends.
+        """
         with self._database.read() as session:
             row = _found(session, recording_id)
             require_raw(row)

@@ -9,7 +9,9 @@ from procedures.core.recording import AROUND, INCREMENTS, Channel
 
 
 def length(name: str, seen: int, announced: int | None, settings: FitnessSettings) -> list[Finding]:
-    """Return findings on too few samples, or another number than announced."""
+    """Return findings on a channel with too few samples, or with another number than `announced`; None: no number was
+    announced.
+    """
     found: list[Finding] = []
     if seen < settings.least_samples:
         told = f"channel {name}: {seen} samples are too few, at least {settings.least_samples} are needed"

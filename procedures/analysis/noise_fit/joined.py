@@ -90,7 +90,8 @@ class Joined:
 def joined_at(slow: Powers, fast: Powers | None, crossover_hz: float) -> Joined:
     """Return slow bins below the crossover and fast ones above, as one spectrum.
 
-    Fast bins that do not follow the slow ones at once have a quantization of their own, in a fifth column.
+    Fast bins that do not follow the slow ones at once have a quantization of their own, in a fifth column. `fast` None:
+    the slow bins alone.
     """
     parts = [(slow, slow.frequency_hz < crossover_hz)]
     if fast is not None:

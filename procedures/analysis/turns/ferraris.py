@@ -96,7 +96,9 @@ def ferraris_estimator(motion: Turning, noise: Array | None, flaws: TableErrors,
 def analyse_ferraris(
     recordings: Sequence[Recording], site: Site, uncertainty: TableUncertainty, record: TriadRecord | None
 ) -> WholeTurns:
-    """Return the gyro triad from recordings of faces at rest and turning. Raises `UnfitRecording`, `Undetermined`."""
+    """Return the gyro triad from recordings of faces at rest and turning. Raises `UnfitRecording`, `Undetermined`.
+    `record`: the gyros' noise; None: the residuals stand in.
+    """
     means = station_means(recordings, "gyro")
     if means.output_unit != "rad/s":
         raise UnfitRecording(f"the gyro channels are in {means.output_unit}: whole turns need a nominal scale in rad")

@@ -80,7 +80,7 @@ def _over_runs(figures: Sequence[ThreeSigma], name: str) -> tuple[float, float, 
 def worth(
     name: str, runs: Sequence[PreparedRun], found: Sequence[RunSoaks], correction: Corrects, gravity_m_s2: float
 ) -> FormFound:
-    """Return the performance of a correction on all runs: the worst 3σ, and |ĝ|."""
+    """Return the errors that a correction leaves over all runs: worst 3σ at a soak by axis, and rms of |ĝ| − g."""
     x, y, z = np.max([s.after_m_s2 for s in soak_table(runs, found, correction)], axis=0).tolist()
     g = [magnitude(run.cells, correction, gravity_m_s2) for run in runs]
     still, moving = (
