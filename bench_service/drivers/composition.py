@@ -46,12 +46,11 @@ def driver_of(settings: Settings, asking: Asking) -> BenchDriver:
 
 
 def devices_of(folder: Path, bench_id: str, bench_file: Path | None = None) -> BenchDevices:
-    """The devices of a bench on this host: by a bench file, given or remembered by their register; else simulated.
+    """Return the devices of a bench on this host: real ones by the bench file given, or else by the one that the
+    register in `folder` remembers; simulated ones where there is no bench file.
 
-    Their state can be read whatever becomes of the file. It is read when the devices are first commanded or compared,
-    and kept: a change of it holds from the process's next start.
-
-    `bench_file` None: the one that the register of `folder` remembers, if any.
+    The devices' state can be read whatever becomes of the bench file. The file is read when the devices are first
+    commanded or compared, and kept: a change of the file holds from the process's next start.
     """
     register = DeviceRegister(folder, bench_id)
     file = _file_of(register, bench_file)

@@ -38,7 +38,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Decision:
-    """How one value was decided: rule, outcome, expanded uncertainty, guard band."""
+    """Record of how one value was decided: rule, outcome, expanded uncertainty, guard band."""
 
     rule: str
     """Rule in words; a test of significance is held at its level, without a guard band."""

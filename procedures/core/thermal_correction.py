@@ -116,7 +116,9 @@ EXTRAPOLATED_C = 1.0
 
 @dataclass(frozen=True)
 class TemperatureRange:
-    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
+    """Readings of the two sensors, least and greatest, between which a correction was fitted [°C]. Raises
+    `BadParameter`.
+    """
 
     case_c: tuple[float, float]
     converter_c: tuple[float, float]

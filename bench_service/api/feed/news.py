@@ -78,7 +78,7 @@ class NewsReader:
         it never had a driver.
         """
         own = self._service.live
-        return own.said() if bench_id == own.own else known.lives.get(bench_id)
+        return own.own_live() if bench_id == own.own else known.lives.get(bench_id)
 
     async def events(self, job_id: str, after: int) -> tuple[int, bytes]:
         """Return the last sequence and the frame of a job's new events; an empty frame where there are none."""

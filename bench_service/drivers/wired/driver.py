@@ -144,7 +144,7 @@ class BenchFileDriver:
         """Ask the devices for identity and limits; returns the failures, and describes the bench again."""
         found = survey(self._file)
         self._found |= found.found
-        for sentence in found.limits_said(self._file):
+        for sentence in found.limit_differences(self._file):
             if sentence not in self._told:  # it is asked before each job, and differs but rarely
                 log.warning("bench %s: %s", self._file.id, sentence)
             self._told.add(sentence)

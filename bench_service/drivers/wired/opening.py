@@ -54,7 +54,7 @@ class Survey:
     readings: dict[Kind, Any] = field(default_factory=dict[Kind, Any])
     failures: dict[Kind, Exception] = field(default_factory=dict[Kind, Exception])
 
-    def limits_said(self, file: BenchFile) -> tuple[str, ...]:
+    def limit_differences(self, file: BenchFile) -> tuple[str, ...]:
         """Return sentences about limits that differ between file and devices."""
         return tuple(
             f"{kind}.{sentence}"

@@ -142,7 +142,7 @@ def rest_means(recordings: Sequence[Recording]) -> StationMeans:
 
 
 def only(motion: Turning, which: Array) -> Turning:
-    """Return the motion of some of the stations, by a mask (n,)."""
+    """Return the motion of the stations that a mask (n,) selects."""
     angles = tuple(a for a, taken in zip(motion.angles, which, strict=True) if taken)
     fields = ("seconds", "axis_b", "angle_rad", "rate_rad_s", "earth_rad", "moments", "earth_rate_b")
     return replace(motion, **{name: getattr(motion, name)[which] for name in fields}, angles=angles)
