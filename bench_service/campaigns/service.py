@@ -121,7 +121,7 @@ class CampaignService:
             raise _as_asked(error, campaign, request.parameters) from error
         bench = self._planner.context(request.unit, request.bench).bench
         if request.seed is not None and not bench.simulated:
-            raise BadParameter("seed", request.seed, "only a simulated bench has one")
+            raise BadParameter("seed", request.seed, "null: only a simulated bench has a seed")
         steps = tuple(
             StepRun(
                 plan.name, plan.does, StepState.SKIPPED if plan.left_out else StepState.QUEUED, reason=plan.left_out

@@ -62,7 +62,7 @@ class JobService:
         if plan.violations:
             raise BadParameter("stations", plan.violations[0], "beyond a limit of the bench")
         if request.seed is not None and not plan.context.bench.simulated:
-            raise BadParameter("seed", request.seed, "only a simulated bench has one")
+            raise BadParameter("seed", request.seed, "null: only a simulated bench has a seed")
         if request.reservation is not None:
             self._queues.usable(request.reservation, plan.context.bench.id, request.unit)
         register(self._stores.units, plan.context.unit)

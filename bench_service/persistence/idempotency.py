@@ -38,7 +38,8 @@ def made_before(session: Session, idempotency: Idempotency | None, kind: str) ->
     if row is None:
         return None
     if (row.kind, row.fingerprint) != (kind, idempotency.fingerprint):
-        raise IdempotencyConflict(f"the idempotency key {idempotency.key!r} was used before with another request")
+        used = f"the idempotency key {idempotency.key!r} was used before with another request"
+        raise IdempotencyConflict(f"{used}: a new request needs a new key")
     return row.made_id
 
 

@@ -92,7 +92,7 @@ class AxisCorrection:
         known.
         """
         if not self.covariance:
-            raise BadParameter("covariance", self.covariance, "known, (8, 8)")
+            raise BadParameter("covariance", self.covariance, "a known one, (8, 8): the uncertainties come from it")
         return np.sqrt(np.diagonal(np.array(self.covariance)))
 
     def apply(self, output_m_s2: ArrayLike, case_c: ArrayLike, converter_c: ArrayLike, dynamic: ArrayLike) -> Array:
