@@ -19,7 +19,7 @@ class Limit(Part):
 
 
 class Decision(Part):
-    """How one value was decided: rule, outcome, expanded uncertainty, guard band."""
+    """Record of how one value was decided: rule, outcome, expanded uncertainty, guard band."""
 
     rule: str
     """Rule in words; a test of significance is held at its level, without a guard band."""
@@ -444,7 +444,9 @@ class AxisCorrection(Part):
 
 
 class TemperatureRange(Part):
-    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
+    """Readings of the two sensors, least and greatest, between which a correction was fitted [°C]. Raises
+    `BadParameter`.
+    """
 
     case_c: tuple[float, ...]
     """Lowest and highest reading of the case's sensor [°C]"""

@@ -39,7 +39,9 @@ class Movement(Part):
 
 
 class TriadDiagnosis(Part):
-    """Scored changes of a triad, the largest first, and what the residuals say as a whole; JSON-ready."""
+    """Scored changes of a triad, the largest first, and what the residuals say as a whole: their p-values, and
+    movements outside the triad that would explain them. JSON-ready.
+    """
 
     triad: str
     """Triad: gyro or accelerometer"""
