@@ -62,7 +62,7 @@ class ScalarCheck:
 
 @dataclass(frozen=True)
 class TriadSummary:
-    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets. JSON-ready."""
+    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets."""
 
     calibration: TriadCalibration
     coefficients: tuple[Coefficient, ...]

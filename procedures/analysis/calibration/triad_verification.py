@@ -30,9 +30,7 @@ from procedures.core.unit import Unit
 
 @dataclass(frozen=True)
 class TriadVerification:
-    """Verification result of one triad: magnitudes, their test against the prediction, and the diagnosis.
-    JSON-ready.
-    """
+    """Verification result of one triad: magnitudes, their test against the prediction, and the diagnosis."""
 
     magnitudes: Magnitudes
     chi_square: float | None

@@ -17,7 +17,7 @@ from procedures.core.unit import TriadRecord
 
 @dataclass(frozen=True)
 class Magnitudes:
-    """|v̂| at n stations before and after correction, in SI; plain tuples, JSON-ready."""
+    """|v̂| at n stations before and after correction, with their means and spreads, in SI."""
 
     triad: str
     unit: str

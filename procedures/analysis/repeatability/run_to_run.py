@@ -13,7 +13,7 @@ from procedures.core.imu_model import TriadCalibration
 
 @dataclass(frozen=True)
 class Scatter:
-    """Sample standard deviation of one coefficient over n calibrations; plain numbers, JSON-ready."""
+    """Sample standard deviation of one coefficient over n calibrations."""
 
     triad: str
     name: str
