@@ -19,8 +19,8 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.prompts import AskedOperator
 from bench_service.bench.safety import SafetyService
-from bench_service.bench.stop.elsewhere import StopAddresses
-from bench_service.bench.stop.road import StopRoads
+from bench_service.bench.stop.other_hosts import StopAddresses
+from bench_service.bench.stop.routes import StopRoutes
 from bench_service.bench_files import BenchFiles
 from bench_service.collector import no_collection
 from bench_service.drivers.composition import devices_of, driver_of, own_devices
@@ -109,12 +109,12 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     return service
 
 
-def _stop_routes(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
+def _stop_routes(settings: Settings, opened: Database, closing: ExitStack) -> StopRoutes:
     """The ways of a stop to the benches of this host and of others."""
     addresses = StopAddresses(SqlStopAddresses(opened).all, settings.stop_secret_in())
     addresses.begin()
     closing.callback(addresses.end)
-    return StopRoads(settings.devices_in(), addresses.road, addresses.host)
+    return StopRoutes(settings.devices_in(), addresses.route, addresses.host)
 
 
 def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkApart:

@@ -18,7 +18,7 @@ _MOST_RETRIES = 32
 
 
 class SqlKeyStore:
-    """SQL implementation of `bench_service.evidence.keys.KeyStore`."""
+    """SQL implementation of `bench_service.evidence.idempotency_keys.KeyStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -23,7 +23,7 @@ from bench_service.persistence.evidence.chunk_reader import ChunkReader
 from bench_service.persistence.evidence.raw_places import require_raw
 from bench_service.persistence.evidence.recording_rows import info_of_row, stored_of_row
 from bench_service.persistence.evidence.recording_writer import SqlRecordingWriter
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.searching import find_recordings
 from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
 from bench_service.persistence.text_search import ways_to_recordings
