@@ -67,7 +67,8 @@ def noise_trends(
     """Yield figures of noise coefficients over the unit's static launches, oldest first; none with fewer than two
     results.
 
-    `newest`: only this result and older ones; None: up to the unit's newest.
+    `simulated`: of recordings of a simulated bench, or of real ones. `newest`: only this result and older ones; None:
+    up to the unit's newest.
     """
     documents = [d["channels"] for d in _documents(stores, serial, simulated, newest)][::-1]
     if len(documents) < 2:

@@ -29,7 +29,9 @@ NAMED_BY_PEOPLE = ("text", "phone", "xsens", "ros", "parquet", "arrow", "mat5", 
 
 def propose(file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
     """Return a proposed description of one file; reads all rows. Raises `UnreadableFile`, `UnfitRecording`,
-    `BadParameter`. `unit`, `form`, `table`: serial, format and table where they are known, None: they are found in the
+    `BadParameter`.
+
+    `unit`: serial of the unit; None: a person is asked for it. `form`, `table`: None: recognised by the content of the
     file.
     """
     found = format_of(file.stream, form)

@@ -29,7 +29,9 @@ CORRECTION = TypeAdapter(UnitCorrection)
 def correction_of_row(
     row: CorrectionRow, verdict: str, of_job: bool, decisions: Sequence[CorrectionDecisionRow] = ()
 ) -> StoredCorrection:
-    """Convert a row with its result's verdict and its decisions, oldest first, to a stored correction."""
+    """Convert a row with its result's verdict and its decisions, oldest first, to a stored correction. `of_job`: the
+    result gave a job its verdict.
+    """
     return copied(
         StoredCorrection,
         row,

@@ -157,6 +157,8 @@ def deviation(
     two-thousandth by periodic signals), it is differenced term by term.
 
     `sizes`: cluster sizes [samples]; None: the thesis's, evenly in their logarithm. Raises as `DeviationStream`.
+
+    `increments` as in `DeviationStream`.
     """
     for correlate in (True, False):
         stream = DeviationStream(

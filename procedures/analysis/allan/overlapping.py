@@ -55,7 +55,9 @@ def strides_of(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
 
 
 def snapped_sizes(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
-    """Return the sizes as they will be computed, (k,): multiples of the strides they use."""
+    """Return the sizes at which the sums will be computed, ascending, each once: multiples of the distances of their
+    starts (`strides_of`).
+    """
     s = strides_of(sizes, statistic, count)
     return np.unique(np.minimum(np.round(sizes / s).astype(np.int64), statistic.largest(count) // s) * s)
 

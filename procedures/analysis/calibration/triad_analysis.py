@@ -53,7 +53,7 @@ def analyse_triad(
     """Return the calibration of one triad from one recording a station.
 
     `record`: the unit's noise; None: the scatter within the dwells stands in (`noise_of_means`). Raises
-    `UnfitRecording`, `MissingChannel`, `Undetermined`.
+    `UnfitRecording`, `MissingChannel`, `Undetermined`. `with_scalar`: also make the cross-check from magnitudes alone.
     """
     means = station_means(recordings, triad)
     return analyse_means(means, site, uncertainty, record, with_scalar, weighting)[0]
@@ -89,8 +89,8 @@ def analyse_means(
 ) -> tuple[TriadSummary, TriadFit]:
     """Calibrate one triad from its station means.
 
-    `more`: covariances (3, n, n) from causes other than noise, by name. `record` as in `analyse_triad`. Raises
-    `UnfitRecording`, `Undetermined`.
+    `more`: covariances (3, n, n) from causes other than noise, by name. `record` and `with_scalar` as in
+    `analyse_triad`. Raises `UnfitRecording`, `Undetermined`.
     """
     angles = station_angles(means)
     vectors = reference_vectors(means.triad, angles, site)
@@ -111,8 +111,8 @@ def analyse_inputs(
 ) -> tuple[TriadSummary, TriadFit]:
     """Calibrate one triad from its station means at known input vectors (n, 3) of one magnitude, `reference` [SI].
 
-    `table`: the flaws of what set them; `more` and `record` as in `analyse_means`. Raises `UnfitRecording`,
-    `Undetermined`.
+    `table`: the flaws of what set them; `more`, `record` and `with_scalar` as in `analyse_means`. Raises
+    `UnfitRecording`, `Undetermined`.
     """
     noise, known = noise_of_means(means, record)
     noise = noise + sum((more or {}).values())

@@ -60,8 +60,8 @@ def constant(
 
 
 def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: int, words: Wording) -> list[Finding]:
-    """Return findings on samples that pile up at the largest or smallest value, or at the end of a converter's
-    range.
+    """Return findings on samples that pile up at the largest or smallest value, or at the end of a converter's range.
+    `is_integer`: the channel sends whole counts.
     """
     found: list[Finding] = []
     for edge, other in (edges, edges[::-1]):

@@ -80,7 +80,9 @@ def sentence(radius_m: float, own_m: float | None, uncalibrated_m: float | None,
 
 
 def warnings(gyro: TriadErrors, accelerometer: TriadErrors, has_launch: bool) -> tuple[str, ...]:
-    """Return warnings on contributions that are missing from the figures."""
+    """Return warnings on contributions that are missing from the figures. `has_launch`: the launch-to-launch stability
+    of the unit is known.
+    """
     found = [
         f"the noise of the {name} triad is not known and counts as none"
         for name, errors in (("gyro", gyro), ("accelerometer", accelerometer))

@@ -73,7 +73,9 @@ class Joined:
         return replace(self, spectrum=replace(s, columns=columns))
 
     def octaves(self, variances: Array, amplitudes: Array, ramp: bool) -> tuple[Octave, ...]:
-        """Return the goodness of fit of each octave, separately for slow and fast, and for fitted and excluded bins."""
+        """Return the goodness of fit of each octave, separately for slow and fast, and for fitted and excluded bins.
+        `ramp`: the model had a ramp.
+        """
         s = self.spectrum if ramp else self.spectrum.without_ramp
         z = deviates(s, variances, amplitudes)
         key = self.group * 2 + ~self.fitted
