@@ -19,8 +19,8 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.prompts import AskedOperator
 from bench_service.bench.safety import SafetyService
-from bench_service.bench.stop.elsewhere import StopAddresses
-from bench_service.bench.stop.road import StopRoads
+from bench_service.bench.stop.other_hosts import StopAddresses
+from bench_service.bench.stop.routes import StopRoutes
 from bench_service.bench_files import BenchFiles
 from bench_service.collector import no_collection
 from bench_service.drivers.composition import devices_of, driver_of, own_devices
@@ -109,12 +109,12 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     return service
 
 
-def _stop_routes(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
+def _stop_routes(settings: Settings, opened: Database, closing: ExitStack) -> StopRoutes:
     """The ways of a stop to the benches of this host and of others."""
     addresses = StopAddresses(SqlStopAddresses(opened).all, settings.stop_secret_in())
     addresses.begin()
     closing.callback(addresses.end)
-    return StopRoads(settings.devices_in(), addresses.road, addresses.host)
+    return StopRoutes(settings.devices_in(), addresses.route, addresses.host)
 
 
 def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkApart:
@@ -143,8 +143,9 @@ def create_app(
 ) -> FastAPI:
     """Return the FastAPI application around a service that is open; `at_end` is called when the server shuts down.
 
-    `rules`: decide which requests are let in; `proxies`: those that authenticate people; `late`: begun when the server
-    answers, it loads all routes but those of health.
+    `max_import_bytes`: size from which the files of an import are refused. `rules`: decide which requests are let in.
+    `proxies`: the reverse proxies that are trusted to authenticate people. `late`: loads all routes but those of
+    health, from the moment at which the server answers.
     """
 
     @asynccontextmanager

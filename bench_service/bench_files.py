@@ -33,7 +33,9 @@ class BenchFiles:
         self._devices = own_devices(settings)
 
     def rescue(self) -> Rescue | None:
-        """Make safe the devices that a dead process left, before a database is opened; see `before_anything_else`."""
+        """Make safe the devices that a dead process left unsafe, before a database is opened; None where they were
+        safe. See `before_anything_else`.
+        """
         return before_anything_else(self._devices, f"the service, {ProcessIdentity.own()}")
 
     def begin_driving(self) -> None:

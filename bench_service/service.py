@@ -11,7 +11,7 @@ from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import Rescue
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.safety import SafetyService
-from bench_service.bench.stop.road import StopRoads
+from bench_service.bench.stop.routes import StopRoutes
 from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
@@ -61,7 +61,7 @@ class BenchService:
         live: LiveBoard | None = None,
         free_bytes: Callable[[], int | None] = lambda: None,
         traces: Traces | None = None,
-        stop_routes: StopRoads | None = None,
+        stop_routes: StopRoutes | None = None,
         rescued: Rescue | None = None,
         processes: WorkApart | None = None,
         database: DatabasePort | None = None,
@@ -102,7 +102,7 @@ class BenchService:
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
         self.manual = ManualService(stores, planner.benches, self.queues, self._wake)
         self._presence = Presence(stores.manual)
-        self._stop_routes = stop_routes or StopRoads(None)
+        self._stop_routes = stop_routes or StopRoutes(None)
         self.stops = StopService(stores, planner.benches, safety, self._wake, self._stop_routes, stores.audit)
         self.campaigns = CampaignService(stores, planner, self.analyses, self.jobs.submit, self.jobs.cancel)
         self._driver = driver

@@ -118,7 +118,7 @@ async def _driven(chamber: Chamber, profile: TemperatureProfile, stream: Stream,
                     raise DeviceFault(wrong)
                 if await _advance(chamber, progress, t_s, temperatures, air_c):
                     return
-    raise SoakNotReached("the recording is over, and the profile is not")
+    raise SoakNotReached("the recording ended before the last leg of its profile: give the legs a greater longest_s")
 
 
 async def _advance(

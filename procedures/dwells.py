@@ -113,7 +113,7 @@ def expected_stations(stations: Sequence[Station]) -> tuple[Station, ...]:
 
 
 def saved_tables(saved: DwellsSaved | None) -> tuple[Table, ...]:
-    """Return the table of `saved_table`; nothing where dwells lasted their time."""
+    """Return the table of `saved_table` alone; none where `saved` is None, as no station had a stop rule."""
     return () if saved is None else (saved_table(saved),)
 
 

@@ -56,7 +56,9 @@ class Result(Outcome):
 def calibrated(
     recordings: Sequence[Recording], site: Site, table: TableUncertainty, unit: Unit | None, limits: FerrarisLimits
 ) -> Result:
-    """Return the calibration of both triads, with checks. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    """Return the calibration of both triads, with checks. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`.
+    `unit` None: no noise is known, and the residuals stand in.
+    """
     gyro = analyse_ferraris(recordings, site, table, unit.gyro if unit else None)
     at_rest = analyse_means(rest_means(recordings), site, table, unit.accelerometer if unit else None)
     (force,) = suspected([at_rest])

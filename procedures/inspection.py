@@ -43,7 +43,7 @@ def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording
 
 def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Unit | None) -> R:
     """Return the result of `Method.analyse` on inspected recordings, or on the requested stretch of them. Raises
-    `DomainError`.
+    `DomainError`. `unit`: the unit of the evidence with its current record; None for a method without one.
     """
     recordings = _stretches(evidence.recordings, params)
 

@@ -97,7 +97,9 @@ SLOW = ("rate_random_walk", "rate_ramp")
 def launch_checks(
     launches: Sequence[LaunchNoise], channels: Sequence[ChannelSummary], limits: NoiseLimits, unit: Unit | None
 ) -> tuple[Check, ...]:
-    """Checks of the noise and of the surroundings; where a triad is held to no limit, that there is a noise at all."""
+    """Checks of the noise and of the surroundings; where a triad is held to no limit, that there is a noise at all.
+    `unit`: its declared triads are held to the thesis's limits where no other is given; None: no triad is.
+    """
     found = [
         _check(s, process, limit, size)
         for s in channels

@@ -253,6 +253,10 @@ class Procedure(Generic[P, R]):
 class Method(Generic[P, R]):
     """A method of analysing existing recordings or calibrations; needs no bench: its parameters, its functions, its
     version.
+
+    `analyse` takes the evidence, the parameters, and the unit of the evidence with its current record: its noise,
+    calibrations and corrections are used where an analysis needs them and none are given. None: the unit is not known
+    here.
     """
 
     name: str

@@ -50,7 +50,7 @@ async def _beside(table: Turntable, sinusoid: Sinusoid, stream: Stream) -> Block
     rows, asked_s = EncoderRows(stream.start_s, stream.rate_hz), stream.start_s
     async with taken(stream.blocks) as blocks:
         async for block in blocks:
-            beside = rows.beside(len(block), table.trace())
+            beside = rows.next_rows(len(block), table.trace())
             if rows.end_s - max(rows.newest_s, asked_s) > QUIET_S:
                 asked_s = rows.end_s
                 await _require_swinging(table, sinusoid)
@@ -89,7 +89,7 @@ class EncoderRows:
         """Bench time of the newest reading [s]; minus infinity before the first one."""
         return float(self._kept.time_s[-1]) if len(self._kept.time_s) else -inf
 
-    def beside(self, count: int, fresh: EncoderTrace) -> NDArray[np.int32]:
+    def next_rows(self, count: int, fresh: EncoderTrace) -> NDArray[np.int32]:
         """Return the encoder rows of the next samples, (count, 5) counts: the newest reading at each one's end. Raises
         `DeviceFault`.
         """

@@ -92,7 +92,9 @@ class TableParameters(SiteParameters):
         )
 
     def require_sources(self, context: Context, corrected: bool) -> None:
-        """Refuse a source that the budget must have and that has no value. Raises `BadParameter` with its name."""
+        """Refuse a source that the budget must have and that has no value. Raises `BadParameter` with its name.
+        `corrected`: a thermal correction is applied, which the source "thermometers" needs.
+        """
         site = self.site(context)
         known = [t is not None and any(n.random_walk or n.quantization for n in t.noise) for t in _records(context)]
         values = {

@@ -28,7 +28,9 @@ def rest_with_demands(rest_s: float, bench: BenchDescription, turns: int = 1) ->
 
 
 def require_rest(field: str, rest_s: float | None, bench: BenchDescription, turns: int = 1) -> None:
-    """Refuse a rest [s] that is shorter than the demands of so many turns. Raises `BadParameter`, naming the field."""
+    """Refuse a rest [s] that is shorter than the table takes for the demands of so many turns; None counts as no rest.
+    Raises `BadParameter`, naming the field.
+    """
     least_s = turns * bench.turn_extra_s
     if (rest_s or 0.0) < least_s:
         allowed = f"at least {least_s:.3g} s, which the demands of the table of bench {bench.id} take"

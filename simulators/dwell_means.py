@@ -55,8 +55,9 @@ def dwell_means(config: WorldConfig, stations: Sequence[Station], launch: int = 
     """Compute the means of the stations' recordings, in milliseconds of time, for Monte Carlo (`tests.validation`).
 
     The unit is switched on with the table at zero and the stations follow as in a procedure: move, settle, record. See
-    `simulators.imu.sensor.station_means` for what is equal to a full run and what only has the same distribution.
-    Start times differ from those of a full run by what the servo needs to settle beyond half a second.
+    `simulators.imu.sensor.station_means` for what is equal to a full run and what only has the same distribution. Start
+    times differ from those of a full run by what the servo needs to settle beyond half a second. Raises `ValueError`
+    for a station whose recording holds no sample.
     """
     angles: list[TableAngles] = []
     moves: list[int] = []

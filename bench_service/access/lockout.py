@@ -35,7 +35,9 @@ class AttemptRate:
         self._attempts: OrderedDict[str, deque[datetime]] = OrderedDict()
 
     def wait_s(self, address: str, at: datetime) -> float | None:
-        """Count an attempt; return how long to wait [s] where the address has had too many, and count nothing."""
+        """Count an attempt from an address and return None; where the address has had too many, count nothing and
+        return the time to wait [s].
+        """
         with self._mutex:
             seen = self._attempts.setdefault(address, deque())
             self._attempts.move_to_end(address)

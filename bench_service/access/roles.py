@@ -13,7 +13,7 @@ class Role(StrEnum):
 
 
 class Right(StrEnum):
-    """The right that a route needs, or that nobody needs; `LEAST` has the least role with each."""
+    """The right that a route needs; "open" is everybody's, also without log-in."""
 
     OPEN = "open"
     """Everybody, also without log-in: health, the log-in itself."""

@@ -95,8 +95,8 @@ class AccessService:
         self.book.read_again()
 
     def add_account(self, name: str, role: Role, team: str, password: str | None, by: str) -> Account:
-        """Store an account and return it; the first one switches log-in on, and is an admin's. Raises `NameTaken`,
-        `BadParameter`.
+        """Store an account and return it; the first one switches log-in on, and is an admin's. `password` None: this
+        person logs in through a trusted proxy alone. Raises `NameTaken`, `BadParameter`.
         """
         _check_free(name)
         if password is not None:
@@ -107,8 +107,8 @@ class AccessService:
         return account
 
     def change_account(self, name: str, role: Role | None, team: str | None, password: str | None) -> Account:
-        """Change role, team or password of an account, and return it; a new password ends the open sessions and unlocks
-        the name.
+        """Change role, team or password of an account (None: as it is), and return it; a new password ends the open
+        sessions and unlocks the name.
 
         Raises `NotFound`, `BadParameter`, `IllegalTransition` for the role of the last admin.
         """

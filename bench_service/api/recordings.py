@@ -66,7 +66,9 @@ class RecordingView(BaseModel):
         "`origin` (real, mixed or simulated) and `devices`, with identities and certificates"
     )
     warnings: list[str] = Field(description="Findings of the import that a person should know")
-    results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
+    results: list[str] | None = Field(
+        None, description="Results that used the recording, in the answer about this one alone"
+    )
 
     @classmethod
     def of(cls, stored: StoredRecording, results: tuple[str, ...] | None = None) -> "RecordingView":

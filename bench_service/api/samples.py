@@ -35,7 +35,10 @@ HELD = {SheetFormat.MATLAB: 32}
 """Memory that an export holds, by format, in raw bytes of a chunk; a .mat file is held as a whole."""
 BYTES: dict[str, object] = {"schema": {"type": "string", "format": "binary"}}
 DATA: dict[int | str, dict[str, object]] = {
-    200: {"description": "A file in the format that was asked for", "content": {"application/octet-stream": BYTES}}
+    200: {
+        "description": "The samples as a file in the requested format",
+        "content": {"application/octet-stream": BYTES},
+    }
 }
 ZIP: dict[int | str, dict[str, object]] = {
     200: {"description": "A zip with a file a recording and manifest.json", "content": binary("application/zip")}

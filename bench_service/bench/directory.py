@@ -70,7 +70,7 @@ class BenchDirectory:
         return default if default in ids or not ids else ids[0]
 
     def mounted(self, bench_id: str, serial: str | None = None) -> tuple[Unit, ...]:
-        """The units that a bench can test, as declared; a simulated bench draws one for a requested serial.
+        """The units that a bench can test, as declared; a simulated bench draws one for a requested `serial`, too.
 
         Raises `NotFound` for an unknown bench.
         """

@@ -63,6 +63,9 @@ class BenchDriver(BenchDevices, Protocol):
         """The bench with a unit on it, for a job; from a checkpoint, a simulated world continues where it was.
 
         The bench has the devices' links until `Bench.close`. Raises `NotMounted`, `DeviceBusy`, `BenchError`.
+
+        `seed`: of simulated devices, None: 0. `checkpoint` None: a new world. `job`: id of the job that takes the link,
+        None outside of jobs.
         """
         ...
 

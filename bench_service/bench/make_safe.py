@@ -49,7 +49,9 @@ class Obstacle:
 
     @property
     def reason(self) -> str:
-        """The reason of a stop, whose subject is the bench."""
+        """The failures as a predicate about the bench, for the stop that stands afterwards: "could not be made safe:
+        …".
+        """
         return f"could not be made safe: {self.why}"
 
     def __str__(self) -> str:
@@ -57,7 +59,7 @@ class Obstacle:
 
 
 @dataclass(frozen=True)
-class RoadEnd:
+class SafetyOutcome:
     """Outcome of making a bench safe after a job's session: the obstacle that remains, and the failure of the session's
     own link.
     """
@@ -139,7 +141,9 @@ def over_the_jobs_link(session: DrivingSession) -> tuple[tuple[str, ...], bool]:
     return (), True
 
 
-def whole_road(session: DrivingSession, devices: BenchDevices, by: str, given_back: Callable[[], None]) -> RoadEnd:
+def end_safely(
+    session: DrivingSession, devices: BenchDevices, by: str, given_back: Callable[[], None]
+) -> SafetyOutcome:
     """Make the bench of a job's session safe, over the session's link and else over a new one, and end the session;
     return how it went. `given_back` is called once the session's link is closed.
     """
@@ -151,12 +155,12 @@ def whole_road(session: DrivingSession, devices: BenchDevices, by: str, given_ba
         given_back()
         session.close()
     if not failed:
-        return RoadEnd()
+        return SafetyOutcome()
     if not new_link_may_help:
-        return RoadEnd(Obstacle(failed))
+        return SafetyOutcome(Obstacle(failed))
     why = "; ".join(failed)
     obstacle = over_new_link(devices, by)
     if obstacle is None:
-        return RoadEnd(detour=why)
+        return SafetyOutcome(detour=why)
     again = tuple(reason for reason in obstacle.reasons if reason not in why)
-    return RoadEnd(Obstacle((*failed, *again), obstacle.busy), why)
+    return SafetyOutcome(Obstacle((*failed, *again), obstacle.busy), why)

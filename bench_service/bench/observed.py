@@ -31,19 +31,19 @@ class Observer(Protocol):
     """Receives the begin and end of every verb of a device, as "device.verb". Interface: device register, watchdog."""
 
     def begin(self, verb: str, arguments: Mapping[str, Any]) -> None:
-        """Called before the device is asked; where this raises, the verb ends with that failure instead."""
+        """Note a verb, before the device is asked; where this raises, the verb ends with that failure instead."""
         ...
 
     def end(self, verb: str, failure: BaseException | None) -> None:
-        """Called after the device has answered, or failed to answer."""
+        """Note the end of a verb, after the device answered; `failure`: its error, None where it succeeded."""
         ...
 
     def asked(self, device: str) -> None:
-        """Called when the next block of a recording is wanted."""
+        """Note that the next block of a recording is wanted."""
         ...
 
     def heard(self, device: str) -> None:
-        """Called when that block has come, or the recording has ended."""
+        """Note that the wanted block has come, or the recording has ended."""
         ...
 
 

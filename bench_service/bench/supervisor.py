@@ -119,7 +119,9 @@ class Supervisor:
             return True
 
     def look(self, companion: bool = False) -> bool:
-        """Look once, and act on it; False once a companion has nothing left to watch."""
+        """Look at the worker and the devices once, and make the bench safe where that is due. Returns False once a
+        `companion` has nothing left to watch.
+        """
         now_s = monotonic_s()
         driving, state = self._watch.driving(), self._devices.device_state()
         worker = living(driving)

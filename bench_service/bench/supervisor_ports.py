@@ -40,5 +40,7 @@ class SafetyBooks(StopBooks, Protocol):
         ...
 
     def note(self, by: str, text: str, job: str | None) -> None:
-        """Write an action of the supervisor into the audit trail, and into the events of the job that it concerns."""
+        """Write an action of the supervisor into the audit trail, and into the events of the job that it concerns
+        (None: no job).
+        """
         ...

@@ -90,10 +90,13 @@ class Examiner:
         self._catalogue = planner.catalogue
 
     def examine(self, campaign: Campaign, unit: str, bench: str | None, strict: bool) -> Examination:
-        """Preview every step of a campaign. Raises `BadParameter` with the step's field, `NotFound`, `NotMounted`.
+        """Preview every step of a campaign, and return the plan of all. Raises `BadParameter` with the step's field or
+        `window_h`, `NotFound`, `NotMounted`.
 
         With `strict` the unit is the one that the campaign is about to run on: a step that can only begin with a
         calibration is refused where there will be none; without, it is a warning.
+
+        `bench` None: the one of jobs that name none.
         """
         self._planner.context(unit, bench)
         require_consistent(campaign)

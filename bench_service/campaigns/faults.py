@@ -37,8 +37,8 @@ def first_fault(error: ValidationError, where: str) -> BadParameter:
 
 
 def require_known(step: Step, where: str, names: tuple[str, ...] | None) -> None:
-    """Refuse a limit or trend on a quantity that the result can never have, where its quantities are known. Raises
-    `BadParameter`.
+    """Refuse a limit or trend on a quantity that the result can never have, where its quantities are known (`names`
+    None: they are not). Raises `BadParameter`.
     """
     if names is None:
         return

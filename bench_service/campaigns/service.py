@@ -88,8 +88,9 @@ class CampaignService:
         return campaign
 
     def examine(self, campaign: Campaign, unit: str | None = None, bench: str | None = None) -> Examination:
-        """Return the plan of a campaign on a unit, or on the first that is mounted on some bench; see
-        `Examiner.examine`.
+        """Return the plan of a campaign on a unit and bench; see `Examiner.examine`.
+
+        `unit` None: the first that the bench can test. `bench` None: that of jobs which name none.
         """
         if unit is not None:
             return self._examiner.examine(campaign, unit, bench, strict=True)
@@ -120,7 +121,7 @@ class CampaignService:
             raise _as_asked(error, campaign, request.parameters) from error
         bench = self._planner.context(request.unit, request.bench).bench
         if request.seed is not None and not bench.simulated:
-            raise BadParameter("seed", request.seed, "only a simulated bench has one")
+            raise BadParameter("seed", request.seed, "null: only a simulated bench has a seed")
         steps = tuple(
             StepRun(
                 plan.name, plan.does, StepState.SKIPPED if plan.left_out else StepState.QUEUED, reason=plan.left_out
@@ -161,7 +162,8 @@ class CampaignService:
         self, unit: str, procedure: str, name: str, simulated: bool | None, last: int, same_parameters: bool = False
     ) -> Trend:
         """Return the trend of a quantity over a unit's results by a procedure, on request only of those with the newest
-        result's parameters. Raises `NotFound`.
+        result's parameters. Raises `NotFound`. `simulated` None: results of the kind that this bench gives. `last`: the
+        number of latest results.
         """
         self._stores.units.unit(unit)
         self._planner.catalogue.procedure(procedure)

@@ -46,10 +46,11 @@ def driver_of(settings: Settings, asking: Asking) -> BenchDriver:
 
 
 def devices_of(folder: Path, bench_id: str, bench_file: Path | None = None) -> BenchDevices:
-    """The devices of a bench on this host: by a bench file, given or remembered by their register; else simulated.
+    """Return the devices of a bench on this host: real ones by the bench file given, or else by the one that the
+    register in `folder` remembers; simulated ones where there is no bench file.
 
-    Their state can be read whatever becomes of the file. It is read when the devices are first commanded or compared,
-    and kept: a change of it holds from the process's next start.
+    The devices' state can be read whatever becomes of the bench file. The file is read when the devices are first
+    commanded or compared, and kept: a change of the file holds from the process's next start.
     """
     register = DeviceRegister(folder, bench_id)
     file = _file_of(register, bench_file)
@@ -79,7 +80,9 @@ def _kept(path: Path) -> "BenchFile":
 
 
 def own_devices(settings: Settings) -> BenchDevices:
-    """Return the devices of the settings' own bench. Raises `Misconfigured` for a bench file that cannot be used."""
+    """Return the devices of the settings' own bench: real ones by its bench file, else simulated. Raises
+    `Misconfigured` for a bench file that cannot be used, or that has another bench's id.
+    """
     if settings.bench_file is not None:
         _require_id(_kept(settings.bench_file.absolute()).id, settings)
     return devices_of(settings.devices_in(), settings.bench_id, settings.bench_file)

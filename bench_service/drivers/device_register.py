@@ -44,7 +44,8 @@ class DeviceRegister:
 
     def open(self, by: str = "", job: str | None = None) -> "DeviceLink":
         """Take the devices' link, which one process has at a time, and return it. Raises `DeviceBusy` naming its
-        present holder.
+        present holder. `by`: name of this process for others; `job`: id of the job that takes the link, None outside of
+        jobs.
         """
         self.path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)

@@ -87,7 +87,9 @@ class RegisterObserver:
             self._faults.strike(verb, arguments)
 
     def end(self, verb: str, failure: BaseException | None) -> None:
-        """Note the outcome of a demand in the register. One that was refused before anything moved changed nothing."""
+        """Note the outcome of a demand in the register. One that was refused before anything moved changed nothing.
+        `failure`: its error, None where it succeeded.
+        """
         self._notice_losses()
         if verb in READS:
             return
@@ -192,7 +194,8 @@ class RegisteredDevices:
         process stops at once, at an unknown position.
 
         A device whose link is lost stays as it is, and keeps no other from being made safe. The job whose demands are
-        undone stays known until the next one.
+        undone stays known until the next one. Raises `DeviceBusy`, `BenchError` where the devices are real ones of a
+        bench file, and an `ExceptionGroup` of the failures.
         """
         state = self._register.read()
         if state is not None and state.safe:

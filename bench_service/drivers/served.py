@@ -24,8 +24,10 @@ def served_bench(file: BenchFile, faults: Path | None = None) -> ServedBench:
     """Make the world of a bench file's simulation and its ports; nothing is open yet.
 
     A frame's file and a unit's file that the bench file names and does not have are written. Devices that the file
-    simulates within the driving process are not served. Raises `Misconfigured` for a driver whose
-    protocol is not served, a truth or a plan of faults that cannot be used, and a frame's file of other frames.
+    simulates within the driving process are not served. Raises `Misconfigured` for a driver whose protocol is not
+    served, a truth or a plan of faults that cannot be used, and a frame's file of other frames.
+
+    `faults`: file of a plan of faults, None for none.
     """
     devices: dict[str, ServedDevice] = {
         kind: _device(kind, section) for kind, section in file.real().items() if kind != "environment"

@@ -105,6 +105,9 @@ class SimulatedDriver:
         """A world with that unit on the table, at its beginning or at a checkpoint; with its chamber where needed.
 
         Raises `NotMounted`, `DeviceBusy`, `DeviceFault` where the job reads temperatures and the bench has no chamber.
+
+        `seed` None: 0. `checkpoint` None: the beginning. `job`: id of the job that takes the link, None outside of
+        jobs.
         """
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 

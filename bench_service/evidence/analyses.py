@@ -201,4 +201,6 @@ def _require_each_once(field: str, ids: Sequence[str]) -> None:
     """Refuse evidence that is given twice, which would count as two. Raises `BadParameter`."""
     for position, known in enumerate(ids):
         if known in ids[:position]:
-            raise BadParameter(f"{field}.{position}", known, "each is given once")
+            raise BadParameter(
+                f"{field}.{position}", known, "another id, or none: this one is given twice, and would count as two"
+            )

@@ -55,7 +55,7 @@ def export_calibration(
     stores: EvidenceStores, unit: str, calibration_id: str, form: CalibrationForm, other: str | None = None
 ) -> ExportedCalibration:
     """Return a calibration as a file for other software, with its name and media type. Raises `NotFound`,
-    `BadParameter` where the form cannot hold it.
+    `BadParameter` where the form cannot hold it. `other` as in `calibration_subject`.
     """
     subject = calibration_subject(stores, unit, calibration_id, other)
     if other is None and takes_one_triad(form) and form is not CalibrationForm.KALIBR_IMU:

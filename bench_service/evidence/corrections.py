@@ -35,7 +35,7 @@ class StoredCorrection:
 
     @property
     def by_rule(self) -> bool:
-        """Whether the rule made it current; False where a person chose it, and while it is not current."""
+        """True where the rule made the correction current; False where a person chose it, or it is not current."""
         choices = [d for d in self.decisions if d.act in (Act.CHOSEN, Act.GIVEN_BACK)]
         return self.current and (not choices or choices[-1].act is Act.GIVEN_BACK)
 

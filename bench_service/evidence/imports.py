@@ -123,7 +123,9 @@ class ImportService:
             raise
 
     def describe(self, file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
-        """Return a proposed description of a file, for a person to confirm; nothing is stored. Raises `DomainError`."""
+        """Return a proposed description of a file, for a person to confirm; nothing is stored. Raises `DomainError`.
+        `unit`, `form`, `table` as in `propose`.
+        """
         with _in_service_words():
             return self._reader.describe(file, unit, form, table)
 

@@ -59,7 +59,7 @@ class Recomputation:
     result: str
     raw_data_same: bool
     same: bool
-    """True where every number of the document is the stored one, to the last bit; covariances to `ROUNDED`."""
+    """True where every number of the document is the stored one, bit by bit; covariances to 1e-14 of their size."""
     recordings: tuple[RecordingCheck, ...]
     calibrations: tuple[CalibrationCheck, ...]
     differences: tuple[str, ...]

@@ -43,9 +43,11 @@ class RecordingWriter(Protocol):
         ...
 
     def seal(self, checkpoint: dict[str, Any] | None = None, measured: Measured | None = None) -> RecordingInfo:
-        """Write the rest, the count and the content hash, with the world's checkpoint and what devices read meanwhile.
+        """Store the last samples, the count and the content hash; from then on the recording is listed. Return its
+        description.
 
-        Raises `StorageFull`.
+        `checkpoint`: state of the simulated world, None on a real bench. `measured`: readings of the other devices
+        meanwhile, None: none were read. Raises `UnfitRecording` without a sample, `StorageFull`.
         """
         ...
 
@@ -102,7 +104,8 @@ class RecordingStore(Protocol):
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
     ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
-        """Raw samples start…stop (half open) of some channels, chunk by chunk; archived ones come from the archive.
+        """Raw samples start…stop (half open) of the named channels (None: all), chunk by chunk; archived ones come from
+        the archive.
 
         Raises `NotFound`, `MissingChannel`, `RawDataRemoved`; `ArchiveAway` where the archive cannot be read.
         """

@@ -57,7 +57,7 @@ class ResultStore(Protocol):
 
     def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
         """Return the newest result of the procedure that gave a job of the unit its verdict, no second analysis; None
-        where there is none.
+        where there is none. `simulated`: results of a simulated bench, or of a real one.
         """
         ...
 
@@ -72,7 +72,8 @@ class ResultStore(Protocol):
         before: str | None = None,
         parameters: dict[str, Any] | None = None,
     ) -> tuple[ResultValue, ...]:
-        """The values of a quantity in the newest `limit` results of this kind, newest first.
+        """The values of a quantity in the newest `limit` results of the procedure, simulated or real ones, newest
+        first.
 
         Only results older than `before`, an id, and of a job with just these parameters, count, where these are given.
         """

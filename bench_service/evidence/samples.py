@@ -10,7 +10,7 @@ from procedures.core.errors import BadParameter
 
 def treatment_of(stores: EvidenceStores, unit: str, corrected_by: str | None, decimate: int) -> Treatment:
     """Return the treatment of a unit's samples by calibrations and temperature corrections of that unit, given as ids
-    separated by commas.
+    separated by commas (None: no correction), and by means over `decimate` samples.
 
     An expired one may correct what was recorded while it was valid; a rejected one corrects nothing. Raises `NotFound`,
     `BadParameter`.

@@ -62,7 +62,9 @@ class SpreadProcesses:
         return self if values >= MANY_VALUES and not self._closed else None
 
     def used_for(self, recordings: Sequence[Recording]) -> AbstractContextManager[None]:
-        """Inside the block an analysis of these recordings is worked out here, where that is worth it."""
+        """Run the block so that the analysis of these recordings is shared among the processes, where its size is worth
+        it.
+        """
         return spread_over(self.over(sum(r.info.count * len(r.info.channels) for r in recordings)))
 
     def begin_for(self, stations: Sequence[Station], imu: Imu) -> None:

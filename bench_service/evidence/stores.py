@@ -8,7 +8,7 @@ from bench_service.access.stores import AccessStores
 from bench_service.evidence.batches.store import BatchStore
 from bench_service.evidence.calibrations import CalibrationStore
 from bench_service.evidence.corrections import CorrectionStore
-from bench_service.evidence.keys import KeyStore
+from bench_service.evidence.idempotency_keys import KeyStore
 from bench_service.evidence.raw_data.store import RawDataStore
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.evidence.results import ResultStore

@@ -19,7 +19,7 @@ SHOWN_CHARACTERS = 80
 
 @dataclass(frozen=True)
 class Bounds:
-    """Most that an import may take; grows with the size of the files beyond 100 MB."""
+    """Limits of cells, bytes, memory and time of one import; they grow with the size of the files beyond 100 MB."""
 
     cells: int = 100_000_000
     """Largest number of cells that are read: six channels at 400 Hz for 11 h."""

@@ -69,8 +69,8 @@ def extract(
     stop_s: float | None = None,
     origin: str = "",
 ) -> Extract:
-    """Return a part of a recording, by names of channels and by time since its first sample [s]; a sample belongs to
-    its beginning. `origin` travels with it.
+    """Return a part of a recording: some channels by name (None: all), from `start_s` to `stop_s` since its first
+    sample [s] (None: its beginning, its end). A sample belongs to its beginning. `origin` travels with the part.
 
     Raises `MissingChannel`, `BadParameter`.
     """
@@ -87,7 +87,9 @@ def extract(
 
 
 def require_samples(part: Extract, start_s: float | None, stop_s: float | None) -> None:
-    """Refuse a stretch in which no sample begins. Raises `BadParameter` with the range of the recording."""
+    """Refuse a stretch in which no sample begins. Raises `BadParameter` with the range of the recording. `start_s`,
+    `stop_s` as given to `extract`.
+    """
     info, begin_s = part.info, start_s or 0.0
     if part.start < part.stop or info.count == 0:
         return

@@ -11,6 +11,7 @@ def is_empty(jobs: JobStore) -> bool:
 
 def missing_history(devices: DeviceState | None, jobs: JobStore) -> str:
     """Return a sentence where the devices were driven on this host before and the database has no job; else "".
+    `devices` None: never driven here.
 
     The first start of a bench takes the devices' link once; every job takes it once more.
     """

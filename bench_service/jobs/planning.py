@@ -94,6 +94,8 @@ class Planner:
     ) -> Plan:
         """Return the plan of a job; nothing moves or is stored. Raises pydantic's `ValidationError`, `DomainError`,
         `NotFound`, `NotMounted`.
+
+        `bench` None: the default one. `mounting` as in `context`.
         """
         self.catalogue.procedure(name)  # an unknown procedure is said before an unknown unit
         return self.plan_in(self.context(unit, bench, mounting), name, requested)

@@ -98,7 +98,9 @@ class BenchQueue:
         return self.places(driven).get(job_id)
 
     def places(self, driven: bool) -> dict[str, Place]:
-        """Return the places of all queued jobs by job id, in the order of the queue, in one pass."""
+        """Return the places of all queued jobs by job id, in the order of the queue, in one pass. `driven`: True where
+        a worker drives the bench.
+        """
         places: dict[str, Place] = {}
         ahead, last = (0, "") if self.running is None else (1, self.running)
         for number, entry in enumerate(self.entries, start=1):

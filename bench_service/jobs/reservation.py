@@ -37,7 +37,9 @@ class Reservation:
         return self.ended_at is None and at < self.until
 
     def admits(self, other: "Reservation | None") -> bool:
-        """Return whether a job under another reservation need not wait for this one: same holder, or same team."""
+        """Return whether a job under another reservation need not wait for this one: same holder, or same team. `other`
+        None: a job without a reservation.
+        """
         if other is None:
             return False
         return other.holder == self.holder or (bool(self.team) and other.team == self.team)

@@ -11,7 +11,7 @@ from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import LiveBoard
-from bench_service.bench.make_safe import Obstacle, RoadEnd, has_register, over_new_link, still_unsafe, whole_road
+from bench_service.bench.make_safe import Obstacle, SafetyOutcome, end_safely, has_register, over_new_link, still_unsafe
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.session import BenchSession
 from bench_service.evidence.catalogue import AnyProcedure
@@ -87,7 +87,7 @@ class JobRunner:
         self._queries = StopQueries(stores.benches, stores.jobs, driver.description.id, stopped)
         self._by = f"the service, {ProcessIdentity.own()}"
         self._session: BenchSession | None = None
-        self._road = Lock()
+        self._making_safe = Lock()
         """Held while a thread makes the bench of a job safe, the guard's or the job's own; never for a database."""
         self._again_s = 0.0
         self._ending = Event()
@@ -154,7 +154,7 @@ class JobRunner:
         session = self._session
         if session is None or session.job.id != job_id:
             if self._driver.device_state() is not None:
-                with self._road:
+                with self._making_safe:
                     obstacle = over_new_link(self._driver, self._by)
                 return StepOutcome() if obstacle is None else self._not_safe(job_id, obstacle.reason)
             job = self._stores.jobs.get(job_id)
@@ -162,8 +162,8 @@ class JobRunner:
                 session = self._session_of(job)
             except (BenchError, ServiceError) as error:
                 return self._not_safe(job_id, Obstacle((str(error),)).reason)
-        end = self._whole_road(session)
-        with self._road:
+        end = self._end_safely(session)
+        with self._making_safe:
             unsafe = still_unsafe(self._driver, self._by, "the job") if end.obstacle is None else end.obstacle.reason
         if unsafe is not None:
             return self._not_safe(job_id, unsafe)
@@ -182,24 +182,24 @@ class JobRunner:
         session.stop()
         if not has_register(self._driver):  # a bench without a register: its one link is the session's
             return
-        end = self._whole_road(session)
+        end = self._end_safely(session)
         if end.obstacle is not None:
             log.error("job %s: %s", session.job.id, end.obstacle)
 
-    def _whole_road(self, session: BenchSession) -> RoadEnd:
+    def _end_safely(self, session: BenchSession) -> SafetyOutcome:
         def given_back() -> None:
             if self._session is session:
                 self._session = None
 
-        with self._road:
-            return whole_road(session, self._driver, self._by, given_back)
+        with self._making_safe:
+            return end_safely(session, self._driver, self._by, given_back)
 
     def make_safe_again(self) -> None:
         """Make devices safe over a new link that an earlier attempt has given up, once in `AGAIN_S`.
 
         For a stopped bench without a supervisor: nobody else tries before a person releases it.
         """
-        with self._road:
+        with self._making_safe:
             state = self._driver.device_state()
             if self._session is not None or state is None or state.safe or state.linked:
                 return

@@ -62,7 +62,7 @@ class JobService:
         if plan.violations:
             raise BadParameter("stations", plan.violations[0], "beyond a limit of the bench")
         if request.seed is not None and not plan.context.bench.simulated:
-            raise BadParameter("seed", request.seed, "only a simulated bench has one")
+            raise BadParameter("seed", request.seed, "null: only a simulated bench has a seed")
         if request.reservation is not None:
             self._queues.usable(request.reservation, plan.context.bench.id, request.unit)
         register(self._stores.units, plan.context.unit)
@@ -102,8 +102,8 @@ class JobService:
         return self._stores.queue.running(bench_id)
 
     def driving_job(self, bench_id: str) -> str | None:
-        """Return the id of the job that drives a bench now; a job whose end only waits to be written no longer drives
-        it.
+        """Return the id of the job that drives a bench now, or None; a job whose end only waits to be written no longer
+        drives it.
         """
         if self._worker is not None and self._driver is not None and self._driver.description.id == bench_id:
             driving = self._worker.running_job()

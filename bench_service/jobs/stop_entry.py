@@ -38,7 +38,8 @@ class StopEntry:
         self._trail = trail
 
     def enter(self, bench_id: str, word: StopWord) -> str | None:
-        """Enter a stop; return the running job's id, which is cancelled. Raises `StorageFull`, `StorageFailure`.
+        """Enter a stop, cancel the bench's running job, and return that job's id; None where none ran. Raises
+        `StorageFull`, `StorageFailure`.
 
         A stop that was released before the entry is complete ends no job: the one that runs by then began after it.
         """

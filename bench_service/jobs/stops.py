@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.safety import Safety, SafetyService
-from bench_service.bench.stop.road import Sent, StopRoads
+from bench_service.bench.stop.routes import Sent, StopRoutes
 from bench_service.bench.stop.word import StopWord
 from bench_service.jobs.stop_entry import StopEntry
 from bench_service.jobs.stop_keys import StopKeys
@@ -49,7 +49,7 @@ class StopService:
         benches: BenchDirectory,
         safety: SafetyService,
         wake: Callable[[str], None],
-        roads: StopRoads,
+        routes: StopRoutes,
         trail: AuditTrail,
     ) -> None:
         """Set up with `wake`, which has the dispatcher of a bench look at its queue, where it is within reach."""
@@ -57,7 +57,7 @@ class StopService:
         self._benches = benches
         self._safety = safety
         self._wake = wake
-        self._roads = roads
+        self._routes = routes
         self._entry = StopEntry(stores.benches, stores.queue, stores.jobs, trail)
         self._ledger = StopLedger(self._enter)
         self._keys = StopKeys()
@@ -88,15 +88,15 @@ class StopService:
         return stopped
 
     def _stop(self, bench_id: str, word: StopWord, books_by_s: float, patient: bool) -> Stopped:
-        road = self._roads.to(bench_id)
-        here = road is not None and road.here
-        sent = Sent(False) if road is None else road.ask(word)
+        route = self._routes.to(bench_id)
+        here = route is not None and route.here
+        sent = Sent(False) if route is None else route.ask(word)
         entering = self._ledger.enter(bench_id, word)
         if not sent.taken:
             # A stop that no bench has received is in the database or nowhere: the caller waits for that.
             job, books = self._entered(entering, BOOKS_S)
             if books:
-                raise StorageFailure(f"{self._roads.unreached(bench_id, here)} ({books}; it is tried again)")
+                raise StorageFailure(f"{self._routes.unreached(bench_id, here)} ({books}; it is tried again)")
             safety = self._safety_now(bench_id, here, patient)
         else:
             safety = sent.safety or self._safety_now(bench_id, here, patient)
@@ -120,7 +120,7 @@ class StopService:
     def _enter(self, bench_id: str, word: StopWord) -> str | None:
         self._benches.description(bench_id)
         job = self._entry.enter(bench_id, word)
-        channel = self._roads.channel(bench_id)
+        channel = self._routes.channel(bench_id)
         if channel is not None:
             channel.mark_booked([word.id])
         return job
@@ -146,7 +146,7 @@ class StopService:
         if any(stop.id == stop_id for stop in self._stores.benches.standing_stops(bench_id)):
             self._safety.require(bench_id)
         released = self._stores.benches.release_stop(bench_id, stop_id, now(), by, remark)
-        channel = self._roads.channel(bench_id)
+        channel = self._routes.channel(bench_id)
         if channel is not None:
             channel.clear([stop_id])
         self._wake(bench_id)

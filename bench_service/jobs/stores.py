@@ -76,8 +76,8 @@ class JobStore(Protocol):
         failure: Failure | None = None,
         result_id: str | None = None,
     ) -> Job:
-        """Change a job's state, with the fields that depend on it, and return the job; a change to its present state is
-        a no-op. Raises `IllegalTransition`, `NotFound`.
+        """Change a job's state, with the fields that depend on it (None: as they are), and return the job; a change to
+        its present state is a no-op. Raises `IllegalTransition`, `NotFound`.
         """
         ...
 

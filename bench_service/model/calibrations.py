@@ -151,8 +151,8 @@ def takes_over(verdict: Verdict, current: Current | None, at: datetime) -> bool:
     """Return whether a job's calibration or correction becomes current: the job passed, and no usable choice of a
     person stands.
 
-    A choice of a person stands until the person gives the triad or kind back to the rule, or the chosen one is rejected
-    or expires.
+    `current`: the one that is current now, None: there is none. A choice of a person stands until the person gives the
+    triad or kind back to the rule, or the chosen one is rejected or expires.
     """
     if verdict is not Verdict.PASS:
         return False

@@ -52,7 +52,7 @@ class NotFound(ServiceError):
 
 
 class IllegalTransition(ServiceError):
-    """Raised where the job's state does not allow a request."""
+    """Raised where the state of a job, run, batch, stop, hold or account does not allow a request."""
 
 
 class IdempotencyConflict(ServiceError):
@@ -60,7 +60,7 @@ class IdempotencyConflict(ServiceError):
 
 
 class NameTaken(ServiceError):
-    """Raised where a campaign of that name exists already."""
+    """Raised where a campaign, account or token of that name exists already."""
 
 
 class CalibrationRefused(ServiceError):

@@ -20,9 +20,10 @@ from procedures.core.recording import Station
 
 
 class JobState(StrEnum):
-    """The state of a job. `FINAL` lists the last states; a paused or interrupted job may be queued again.
+    """The state of a job. One that succeeded, failed or was cancelled has ended.
 
-    A paused job holds no bench: the bench is safe, and others may use it until the job is resumed.
+    A paused or interrupted job may be queued again. A paused job holds no bench: the bench is safe, and others may use
+    it until the job is resumed.
     """
 
     QUEUED = "queued"

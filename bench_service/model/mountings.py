@@ -39,5 +39,7 @@ class StoredMounting:
         return self.ended_at is None
 
     def for_context(self) -> Mounting:
-        """Return the part of the mounting that a job's context keeps."""
+        """Return the facts of the mounting that a job keeps with its context: id, plate, person, time, and the azimuth
+        with its uncertainty.
+        """
         return copied(Mounting, self, mounted_at=self.mounted_at.isoformat())

@@ -14,7 +14,7 @@ def begin_notifier(
     settings: Settings, stores: Stores, free_bytes: Callable[[], int | None], least_free_bytes: int, closing: ExitStack
 ) -> None:
     """Start the notifier of this process's bench, where `BENCH_NOTIFY` names a file of targets; it ends with `closing`.
-    Raises `Misconfigured`.
+    Raises `Misconfigured`. `free_bytes`: returns the free space of the database's disk, None where it is not known.
     """
     if settings.notify is None:
         return

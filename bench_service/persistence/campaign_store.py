@@ -19,7 +19,7 @@ from bench_service.model.job import FINAL, JobState
 from bench_service.model.records import Idempotency, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.tables.campaigns import CampaignRow, CampaignRunRow, ScheduleRow
 
 RUN = TypeAdapter(CampaignRun)

@@ -231,7 +231,9 @@ def _switch_to_wal(engine: Engine) -> None:
 
 @contextmanager
 def storage_errors() -> Generator[None, None, None]:
-    """Translate every error of the database or its driver to `StorageFull`, `Conflict` or `StorageFailure`."""
+    """Translate errors of the database or its driver in the block: `StorageFull`, `Conflict`, `UnfitValue` or
+    `DamagedDatabase`; any other one is `StorageFailure`.
+    """
     try:
         yield
     except IntegrityError as error:
@@ -257,7 +259,7 @@ def storage_errors() -> Generator[None, None, None]:
 
 
 def as_storage_error(error: Exception) -> Exception:
-    """Return an error of a database or its driver that others met as `StorageFull`, `Conflict` or `StorageFailure`; any
+    """Return an error of the database or its driver that was caught elsewhere as `storage_errors` translates it; any
     other error as it is.
     """
     if not isinstance(error, (SQLAlchemyError, sqlite3.Error)):

@@ -18,7 +18,7 @@ _MOST_RETRIES = 32
 
 
 class SqlKeyStore:
-    """SQL implementation of `bench_service.evidence.keys.KeyStore`."""
+    """SQL implementation of `bench_service.evidence.idempotency_keys.KeyStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -38,7 +38,8 @@ def made_before(session: Session, idempotency: Idempotency | None, kind: str) ->
     if row is None:
         return None
     if (row.kind, row.fingerprint) != (kind, idempotency.fingerprint):
-        raise IdempotencyConflict(f"the idempotency key {idempotency.key!r} was used before with another request")
+        used = f"the idempotency key {idempotency.key!r} was used before with another request"
+        raise IdempotencyConflict(f"{used}: a new request needs a new key")
     return row.made_id
 
 

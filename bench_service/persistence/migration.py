@@ -68,7 +68,7 @@ def _check_known(revision: str | None) -> None:
     if revision is not None and revision not in _revisions():
         raise StorageFailure(
             f"the database is of another version of this service: it has revision {revision}, and the newest one here "
-            f"is {newest_revision()}"
+            f"is {newest_revision()}: start the version that opened it, or restore the copy that was made before"
         )
 
 

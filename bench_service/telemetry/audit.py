@@ -49,7 +49,9 @@ class AuditTrail(Protocol):
     def list(
         self, *, who: str | None = None, target: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[AuditEntry]:
-        """Return one page of entries, newest first; `target` is a path or one of its parts, such as an id."""
+        """Return one page of entries, newest first, of one person or program (`who`; None: of all); `target` is a path
+        or one of its parts, such as an id.
+        """
         ...
 
     def verify(self, expected: str | None = None) -> ChainReport:

@@ -127,8 +127,8 @@ class Tallies:
         return self._ended_stations - resumed + sum(still.values())
 
     def ended(self) -> dict[JobState, int]:
-        """Return the number of jobs in each state that is never left, as tallied: the database counts longer with the
-        history.
+        """Return the number of jobs in each state that is never left, from the tally: a count in the database takes
+        longer as the history grows.
         """
         found = Counter[str]()
         for (_, state, _), count in self.finished.items():

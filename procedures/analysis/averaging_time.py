@@ -27,7 +27,10 @@ class AveragingTime:
 
 
 def allan_variance(noise: NoiseCoefficients, tau_s: float) -> float:
-    """Allan variance ``3Q²/τ² + N²/τ + (2 ln 2/π)B² + K²τ/3 + R²τ²/2`` [rate²] (thesis 3.2; IEEE Std 952 Annex C)."""
+    """Allan variance ``3Q²/τ² + N²/τ + (2 ln 2/π)B² + K²τ/3 + R²τ²/2`` [rate²] (thesis 3.2; IEEE Std 952 Annex C).
+
+    Raises `BadParameter` for an averaging time that is not above 0.
+    """
     if not 0.0 < tau_s < float("inf"):
         raise BadParameter("tau_s", tau_s, "finite and above 0 s")
     return 3.0 * (noise.quantization / tau_s) ** 2 + _rest(noise, tau_s)
@@ -75,9 +78,11 @@ def averaging_time(noise: NoiseCoefficients, covariance: Array | None = None) ->
 
 
 def dwell(times: Iterable[AveragingTime], step_s: float) -> float | None:
-    """The averaging time of a unit: the longest of its channels', rounded up to a step [s]; None if one has none.
+    """Return the averaging time of a unit [s]: the longest of its channels', rounded up to whole steps; None where a
+    channel has none.
 
-    Thesis 4.1.3: gyros 55 s, accelerometers 65 s, hence 70 s an orientation. Raises `BadParameter`.
+    Thesis 4.1.3: gyros 55 s, accelerometers 65 s, hence 70 s an orientation. Raises `BadParameter` for a step that is
+    not above 0, and for no channel.
     """
     if not 0.0 < step_s < float("inf"):
         raise BadParameter("step_s", step_s, "finite and above 0 s")

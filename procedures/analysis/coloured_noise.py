@@ -83,7 +83,9 @@ def unit_variances(n: int, cell_s: float) -> Array:
 
 @dataclass(frozen=True)
 class FittedNoise:
-    """Noise fitted by maximum likelihood, with the variances of the cosine coefficients under it, and the deviance."""
+    """Noise fitted by maximum likelihood: its coefficients, the variances of the cosine coefficients under it, and the
+    deviance.
+    """
 
     noise: NoiseCoefficients
     variances: Array

@@ -18,7 +18,7 @@ def fell_behind(recordings: Sequence[RecordingInfo]) -> tuple[str, ...]:
         return ()
     worst, length_s = max(late, key=lambda pair: abs(pair[0].behind_s) / pair[1])
     return (
-        f"in {len(late)} of {len(recordings)} recordings {worst.said}, at worst by "
+        f"in {len(late)} of {len(recordings)} recordings {worst.direction}, at worst by "
         f"{abs(worst.behind_s):.3g} s within {length_s:.6g} s: a served world that does not keep its time factor, or "
         "another sample rate than the declared one. Samples count by the unit's clock, waits and ramps by the bench's",
     )

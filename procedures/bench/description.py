@@ -109,7 +109,7 @@ class BenchDescription:
         self, angles: TableAngles, turn: Turn | None = None, profile: TemperatureProfile | None = None
     ) -> tuple[str, ...]:
         """Return violations of the limits by angles, by whole turns that begin at them, or by a profile; a sentence
-        each.
+        each. A motion or a profile that is None is not examined.
         """
         demands = (
             ("outer", self.outer, angles.outer_deg),
@@ -136,8 +136,8 @@ class BenchDescription:
         return self.violations(station.angles, station.turn, station.profile)
 
     def current_violations(self, current_ma: float, profile: TemperatureProfile | None) -> tuple[str, ...]:
-        """Return violations by a converter alone, of a current on its inputs and of a profile that it soaks by, a
-        sentence each.
+        """Return violations of the limits by a test of a converter alone, a sentence each: the current on its inputs,
+        and the profile that it soaks by, where there is one.
         """
         found: tuple[str, ...] = () if profile is None else self._profile_violations(profile)
         if self.current_source is None:

@@ -38,7 +38,8 @@ class Imu(Device, Protocol):
     def rate_hz(self) -> float: ...
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording now; time passes while its blocks are read. Exactly round(duration_s·rate_hz) samples.
+        """Begin a recording of a station now, or of no station (None); time passes while its blocks are read. Exactly
+        round(duration_s·rate_hz) samples.
 
         Returns at once and waits on no line: the first block waits for the first sample. Raises `NotPowered`,
         `Disconnected`, here or from the blocks.

@@ -20,7 +20,7 @@ class SupplyLimits:
     """Current limit at which the output is switched on."""
 
     def violations(self, voltage_v: float, current_a: float | None = None) -> tuple[str, ...]:
-        """Return violations of the limits by a demanded voltage and current, a sentence each."""
+        """Return violations of the limits by a demanded voltage and, where given, a current limit, a sentence each."""
         found: list[str] = []
         if not self.minimum_v <= voltage_v <= self.maximum_v:
             found.append(f"voltage_v = {voltage_v:g} is outside {self.minimum_v:g} … {self.maximum_v:g}")

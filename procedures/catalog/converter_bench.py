@@ -96,9 +96,7 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """Return two stations a soak: plus and minus the current. Raises `BadParameter` for a temperature that is named
-    twice.
-    """
+    """Return two stations a soak: plus and minus the current. Raises `BadParameter` for a temperature given twice."""
     if len(set(params.temperatures_c)) < len(params.temperatures_c):
         raise BadParameter("temperatures_c", params.temperatures_c, "each temperature once")
     stations: list[Station] = []

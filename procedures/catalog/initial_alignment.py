@@ -26,10 +26,10 @@ from procedures.analysis.repeated_alignment.observed import (
     Alignment,
     AngleErrors,
     alignment_errors,
+    alignments_for_display,
     found_attitudes,
     judged_angle,
     recorded_alignments,
-    told_alignments,
 )
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -158,7 +158,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
         verdict=verdict(checks),
         warnings=_warnings(params, context, expected),
         basis=_basis(context),
-        alignments=told_alignments(recordings, plan, found, errors, expected),
+        alignments=alignments_for_display(recordings, plan, found, errors, expected),
         angles=(heading, pitch, roll),
         thesis=thesis_prediction(context.unit, site, params.base_turn_arcsec, params.alignment_s),
     )

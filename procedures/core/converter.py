@@ -62,7 +62,7 @@ class ConverterModel:
         return self.scale.value(temperature_c) * np.asarray(current_ma) + self.zero.value(temperature_c)
 
     def current_ma(self, code: Array, temperature_c: Array) -> Array:
-        """Return the input currents [mA] of codes (n,) at temperatures (n,) [°C], for stage two."""
+        """Return the input currents [mA] that give codes (n,) at temperatures (n,) [°C]: the inverse of `code`."""
         return (code - self.zero.value(temperature_c)) / self.scale.value(temperature_c)
 
 

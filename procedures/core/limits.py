@@ -38,7 +38,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Decision:
-    """How one value was decided: rule, outcome, expanded uncertainty, guard band."""
+    """Record of how one value was decided: rule, outcome, expanded uncertainty, guard band."""
 
     rule: str
     """Rule in words; a test of significance is held at its level, without a guard band."""
@@ -69,9 +69,7 @@ class Decision:
 
 
 def coverage_factor(probability: float, degrees_of_freedom: float | None) -> float:
-    """Return Student's factor k of a two-sided interval (JCGM 100, G.3); normal where no degrees of freedom are
-    given.
-    """
+    """Return Student's factor k of a two-sided interval (JCGM 100, G.3); None: infinitely many, the normal one."""
     from scipy.special import ndtri, stdtrit  # a start does without it
 
     tail = 0.5 * (1.0 + probability)
@@ -91,7 +89,9 @@ def combined_freedom(parts: list[tuple[float, float | None]]) -> float | None:
 
 
 def inside(value: float, minimum: float | None, maximum: float | None) -> float:
-    """Return the distance of a value from the nearer limit; negative outside, and for no finite value."""
+    """Return the distance of a value from the nearer limit; negative outside, and for no finite value. A limit that is
+    None does not exist.
+    """
     below = inf if maximum is None else maximum - value
     above = inf if minimum is None else value - minimum
     found = min(below, above)
@@ -138,7 +138,7 @@ class Limit:
 
 
 def bounds(minimum: float | None, maximum: float | None, unit: str) -> str:
-    """Return the requirement as text for a reader: ≥ 1 and ≤ 2 deg/h."""
+    """Return the requirement as text for a reader: ≥ 1 and ≤ 2 deg/h. A limit that is None is left out."""
     found = [f"≥ {minimum:g}"] if minimum is not None else []
     found += [f"≤ {maximum:g}"] if maximum is not None else []
     return f"{' and '.join(found)} {unit}"
@@ -203,6 +203,7 @@ def check(
     """Return the check of a value against its limit by simple acceptance. A value that is not finite never passes.
 
     `bound`: nothing was observed, and the value is what it stays below; one of infinity becomes None, unbounded.
+    `standard_uncertainty` None: not known; `degrees_of_freedom` None: infinitely many.
     """
     passed = (
         isfinite(value)

@@ -60,7 +60,7 @@ class MeasuredPace:
         return abs(self.behind_s) > max(share * length_s, SCATTERS * self.scatter_s)
 
     @property
-    def said(self) -> str:
+    def direction(self) -> str:
         """Beginning of a sentence: the samples, and whether they fell behind the clock or were ahead of it."""
         way = "fell behind" if self.behind_s > 0.0 else "were ahead of"
         return f"the unit's samples {way} the bench's clock"

@@ -92,7 +92,7 @@ class AxisCorrection:
         known.
         """
         if not self.covariance:
-            raise BadParameter("covariance", self.covariance, "known, (8, 8)")
+            raise BadParameter("covariance", self.covariance, "a known one, (8, 8): the uncertainties come from it")
         return np.sqrt(np.diagonal(np.array(self.covariance)))
 
     def apply(self, output_m_s2: ArrayLike, case_c: ArrayLike, converter_c: ArrayLike, dynamic: ArrayLike) -> Array:
@@ -116,12 +116,13 @@ EXTRAPOLATED_C = 1.0
 
 @dataclass(frozen=True)
 class TemperatureRange:
-    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
+    """Readings of the two sensors, least and greatest, between which a correction was fitted [°C]."""
 
     case_c: tuple[float, float]
     converter_c: tuple[float, float]
 
     def __post_init__(self) -> None:
+        """Check the ends of both ranges. Raises `BadParameter`."""
         for name, (low, high) in (("case_c", self.case_c), ("converter_c", self.converter_c)):
             if not (np.isfinite([low, high]).all() and low <= high):
                 raise BadParameter(name, (low, high), "two finite temperatures, the lower one first")
@@ -150,7 +151,7 @@ class ThermalCorrection:
     triad: str
     axes: tuple[AxisCorrection, AxisCorrection, AxisCorrection]
     first_stage: ConverterTriad | None = None
-    """The converter's models that were taken out of the outputs before the fit (`core.converter.at_reference`), and so
+    """The converter's models that were taken out of the outputs before the fit, and so
     must be wherever the correction is used; None: it is for outputs as they are. The reference of the whole is
     then these models' for the converter's own drift, and the axes' for the rest: best the same."""
     fitted_range: TemperatureRange | None = None

@@ -33,7 +33,9 @@ class Curve:
     """Squared differences that were averaged."""
 
     def plot(self, ax: Any = None, label: str | None = None) -> Any:
-        """Draw the curve and its interval on logarithmic axes; returns the axes (`.figure.savefig(...)`)."""
+        """Draw the curve and its interval on logarithmic axes; returns the axes (`.figure.savefig(...)`). `ax` None:
+        new axes; `label`: name of the curve in a legend.
+        """
         ax = axes(ax)
         (line,) = ax.loglog(self.tau_s, self.deviation, label=label or self.statistic.replace("_", " "))
         ax.fill_between(self.tau_s, self.lower, self.upper, color=line.get_color(), alpha=0.2, linewidth=0.0)

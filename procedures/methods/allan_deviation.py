@@ -90,7 +90,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     if params.band != "none" and params.gaps == "leave_out":
         raise BadParameter("band", params.band, "none where gaps are left out: a band needs every sample")
     curves = tuple(c for r in evidence.recordings for c in _curves(r, statistic, params))
-    curves, told = beside(evidence.recordings, curves, params)
+    curves, told = with_densities_and_bands(evidence.recordings, curves, params)
     shortest = min(min(c.edf[0] for c in curves), 1e9)
     limit = Limit("1", minimum=1.0, source="an interval needs one degree of freedom")
     checks = (check("equivalent degrees of freedom at the shortest τ, the least", shortest, limit),)
@@ -198,7 +198,7 @@ def _naming(recording: str, channel: str = "") -> Generator[None]:
         raise UnfitRecording(f"{where}: {refusal}") from refusal
 
 
-def beside(
+def with_densities_and_bands(
     recordings: Sequence[Recording], curves: tuple[Curve, ...], params: Params
 ) -> tuple[tuple[Curve, ...], tuple[str, ...]]:
     """Return the curves with densities and bands, and sentences on what could not be found."""

@@ -160,7 +160,10 @@ def _positions(recordings: Sequence[Recording], params: Params) -> list[TableAng
         if station is None or station.angles is None:
             raise BadParameter("positions", None, f"recording {recording.info.id} has no angles: give the positions")
         if station.angles.outer_deg != 0.0:
-            raise BadParameter("positions", None, f"recording {recording.info.id} has an outer angle: F has none")
+            turned = (
+                f"recording {recording.info.id} was made at an outer angle, and this method knows only the other two"
+            )
+            raise BadParameter("positions", None, f"{turned}: give the positions")
         found.append(station.angles)
     return found
 

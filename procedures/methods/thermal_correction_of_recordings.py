@@ -41,7 +41,9 @@ Lag = Annotated[float, Field(ge=0.0, le=600.0)]
 
 
 class Params(RecordedParameters):
-    """How the recordings stood, their sensors, and what is asked of the correction."""
+    """Axis that stood upwards in each recording, the sensors, corrections applied first, and the limit of the
+    residuals.
+    """
 
     up: tuple[Literal["x", "y", "z"], ...] | None = Field(
         None, min_length=1, max_length=100, description="axis upwards, one a recording; None: by the stations' angles"

@@ -26,7 +26,10 @@ def noise_report(
     averaging_time_s: float | None,
     drawn_launch: int = 1,
 ) -> Report:
-    """Return the report: Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel."""
+    """Return the report: Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel.
+    `averaging_time_s`: of the unit, None where a channel has none. `drawn_launch`: number, from 1, of the launch that
+    is drawn in full.
+    """
     doubts = disagreements(launches)
     tables = [
         side_by_side(channels, launches),

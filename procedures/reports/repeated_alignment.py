@@ -48,7 +48,9 @@ def heading_figure(alignments: Sequence[Alignment]) -> Figure:
 
 
 def sentence(heading: AngleErrors, thesis: ThesisPrediction | None) -> str:
-    """Return the sentence on the expected error of the heading, and on the prediction of thesis 1.1."""
+    """Return the sentence on the expected error of the heading, and on the prediction of thesis 1.1. `thesis` None: the
+    unit's noise is not known.
+    """
     text = f"One alignment's heading is expected with a standard uncertainty of {heading.expected_sd_deg:.3g} deg"
     if thesis is None:
         return text + "."

@@ -74,7 +74,9 @@ def converters(truths: Sequence[ConverterTruth], board_c: Array) -> tuple[Array,
 
 
 def converter_codes(truth: ConverterTruth, current_ma: Array, board_c: Array) -> Array:
-    """Codes a cycle (n,), before they are whole numbers, of currents [mA] at board temperatures [°C], both (n,)."""
+    """Return the converter's output codes (n,), not yet rounded to whole numbers, at currents [mA] and board
+    temperatures [°C], both (n,).
+    """
     departure = board_c - REFERENCE_C
     gain = truth.codes_a_ma * (1.0 + _square(truth.scale_drift, departure))
     return gain * current_ma + truth.zero_code + _square(truth.zero_drift, departure)

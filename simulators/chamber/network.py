@@ -22,7 +22,9 @@ RAMPED = PLACE
 
 
 def rates(chamber: ChamberTruth, unit: NetworkTruth, door_open: bool) -> tuple[Array, Array]:
-    """A (8, 8) [1/s] and B (8, 4) of ``dT/dt = A·T + B·u``, u in the order of `INPUTS`."""
+    """Return the matrices of the chamber's and the unit's heat, A (8, 8) [1/s] and B (8, 4): ``dT/dt = A·T + B·u``, u
+    in the order of `INPUTS`.
+    """
     nodes = len(NODES)
     capacity = np.array(
         [chamber.air_j_k, chamber.walls_j_k, unit.case_j_k, unit.converter_j_k, unit.accelerometer_block_j_k]

@@ -80,7 +80,10 @@ class ConverterLink:
             tape.put(counts)
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording now, of whatever station. Implements `Imu.record`."""
+        """Begin a recording now; time passes while its blocks are read. Implements `Imu.record`.
+
+        Raises `OutOfRange` for a negative duration, and for a station without a current or without temperatures.
+        """
         self._tapes.need_power()
         if not 0.0 <= duration_s < float("inf"):
             raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")

@@ -71,7 +71,9 @@ class SimImu:
         self._tapes.stop()
 
     def feel(self, motion: Motion, climate: Climate | None = None) -> None:
-        """Count what the unit senses during a motion, in a climate where the world has one; nothing while it is off."""
+        """Count what the unit senses during a motion; nothing while it is off. `climate`: the effect of temperature
+        meanwhile, None where the world has no chamber.
+        """
         if not self._sensors:
             return
         width = max((tape.columns for tape in self._tapes.running), default=len(self._channels))
@@ -91,6 +93,7 @@ class SimImu:
         """Begin a recording now; time passes while its blocks are read. Implements `Imu.record`.
 
         A station that wants temperatures gets their channels after the six, in whole seconds, held at the sample rate.
+        Raises `OutOfRange` for a negative duration, and for temperatures in a world without a chamber.
         """
         self._tapes.need_power()
         if not 0.0 <= duration_s < float("inf"):

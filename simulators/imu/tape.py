@@ -48,7 +48,9 @@ class Tapes:
             tape.broken = True
 
     def need_power(self, tape: Tape | None = None) -> None:
-        """Check that the unit has power. Raises `NotPowered`, also if it was off at any time during the recording."""
+        """Check that the unit has power. Raises `NotPowered`, also if it was off at any time during the recording.
+        `tape`: of a running recording; None: none runs.
+        """
         if self._launch() == 0 or (tape is not None and tape.broken):
             raise NotPowered("the unit is switched off")
 

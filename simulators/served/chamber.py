@@ -189,7 +189,7 @@ class ChamberTalker:
         self._simserv, self._ascii2 = SimservLanguage(controller, kind), Ascii2Language(controller)
 
     def take(self, buffer: bytearray) -> bytes | None:
-        """Take one request, see `Talker`."""
+        """Take one whole request out of the buffer; None: there is none yet. See `Talker`."""
         while (at := buffer.find(b"\r")) >= 0:
             request = bytes(buffer[:at]).strip(b"\n ")
             del buffer[: at + 1]

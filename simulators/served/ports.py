@@ -106,7 +106,7 @@ class Lines:
         self._endings, self._answer = endings, answer
 
     def take(self, buffer: bytearray) -> bytes | None:
-        """Take one request, see `Talker`."""
+        """Take one whole request out of the buffer; None: there is none yet. See `Talker`."""
         while (at := next((k for k, byte in enumerate(buffer) if byte in self._endings), -1)) >= 0:
             request = bytes(buffer[:at])
             del buffer[: at + 1]

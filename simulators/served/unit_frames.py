@@ -43,7 +43,7 @@ class IxcomFrames:
         self._payload = struct.Struct("<6f")
 
     def data(self, counter: int, counts: Sequence[int], time_s: float, valid: bool) -> bytes:
-        """Frame of one sample."""
+        """Return the frame of one sample; `valid`: its status says that the data are valid."""
         values = [count * scale for count, scale in zip(counts, self._scales, strict=True)]
         payload = self._payload.pack(*values[3:], *values[:3])
         return self.message(0x00, counter, payload, time_s, 0 if valid else STANDBY)
@@ -72,7 +72,7 @@ class CountFrames:
         return self._body.size + 2
 
     def data(self, counter: int, counts: Sequence[int], time_s: float, valid: bool) -> bytes:
-        """Frame of one sample."""
+        """Return the frame of one sample; `valid`: its status says that the data are valid."""
         body = self._body.pack(SYNC, counter & 0xFFFF, VALID if valid else NOT_YET, *counts)
         return body + struct.pack("<H", crc16(body))
 

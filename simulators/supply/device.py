@@ -44,7 +44,7 @@ class SimSupply:
         return DeviceIdentity("simulated", "power supply")
 
     async def set_output(self, voltage_v: float, current_a: float) -> None:
-        """Set voltage and current limit. Implements `Supply.set_output`."""
+        """Set voltage and current limit. Raises `OutOfRange`. Implements `Supply.set_output`."""
         if violations := self.limits.violations(voltage_v, current_a):
             raise OutOfRange("; ".join(violations))
         self._set = (voltage_v, current_a)

@@ -25,7 +25,9 @@ def temperature_channels(truth: UnitTruth) -> tuple[Channel, ...]:
 
 
 def declared_unit(truth: UnitTruth, averaging_time_s: float = 70.0, sample_rate_hz: float | None = None) -> Unit:
-    """Build the unit's data sheet: channels, noise coefficients and run-to-run stability as they truly are."""
+    """Build the unit's data sheet: channels, noise coefficients and run-to-run stability as they truly are.
+    `sample_rate_hz`: another rate than the truth's [Hz].
+    """
 
     def record(triad: TriadTruth) -> TriadRecord:
         columns = zip(

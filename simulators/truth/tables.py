@@ -25,7 +25,7 @@ class Key:
 
 
 def check_keys(where: str, table: Table, known: set[str], needed: set[str]) -> None:
-    """Check the keys of a table: no unknown key, and every required one."""
+    """Check the keys of a table: no unknown key, and every required one. Raises `TruthError`."""
     for key in table:
         if key not in known:
             raise TruthError(f"{where}.{key} = {table[key]!r} is not known; known are {', '.join(sorted(known))}")
@@ -34,7 +34,7 @@ def check_keys(where: str, table: Table, known: set[str], needed: set[str]) -> N
 
 
 def read_value(where: str, value: Any, key: Key) -> Any:
-    """Read the value of a key in SI, each number inside the key's range."""
+    """Read the value of a key in SI, each number inside the key's range. Raises `TruthError`."""
     if key.shape == "flag":
         if not isinstance(value, bool):
             raise TruthError(f"{where} = {value!r} must be true or false")
@@ -51,7 +51,7 @@ def read_value(where: str, value: Any, key: Key) -> Any:
 
 
 def read_record(kind: type[Any], where: str, table: Any, needed: set[str]) -> Any:
-    """Read a flat record of numbers and flags from a table of the same names."""
+    """Read a flat record of numbers and flags from a table of the same names. Raises `TruthError`."""
     numbers = _numbers(where, table, kind, needed)
     try:
         return kind(**numbers)
@@ -60,7 +60,9 @@ def read_record(kind: type[Any], where: str, table: Any, needed: set[str]) -> An
 
 
 def read_changes(default: T, where: str, table: Any, keys: Mapping[str, Key] | None = None) -> T:
-    """Replace the values of a record that a table gives; `keys`: None: flat numbers by the same names."""
+    """Return a copy of a record with the values that a table gives. `keys` by name; None: numbers by the record's own
+    names. Raises `TruthError`.
+    """
     if keys is None:
         changes = _numbers(where, table, cast(Any, default), set())
     else:
@@ -93,7 +95,7 @@ def _table(where: str, table: Any) -> Table:
 
 
 def read_document(text: str) -> dict[str, Any]:
-    """Parse the tables of a TOML text."""
+    """Parse the tables of a TOML text. Raises `TruthError`."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as refusal:

@@ -115,7 +115,9 @@ class SimTurntable:
         return taken
 
     async def settle(self) -> None:
-        """Let time pass until the commanded motion is over and the axes rest. Implements `Turntable.settle`."""
+        """Let time pass until the commanded motion is over and the axes rest. Raises `DeviceFault` of a plant that
+        failed, `NotSettled`, `Stopped`. Implements `Turntable.settle`.
+        """
         if self._fault:
             raise DeviceFault(self._fault)
         if self._profile is not None:
@@ -273,7 +275,7 @@ class SimTurntable:
             self._profile = replace(spin, start_rad=spin.start_rad - 2.0 * np.pi * turns)
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from. Only a locked table has one."""
+        """State to resume from. Raises `DeviceFault` while the table moves: only a locked one has a state."""
         if not self.locked:
             raise DeviceFault("a moving table has no checkpoint")
         return {

@@ -50,7 +50,9 @@ def wobble_vector(axis: int, amplitude_arcsec: float, angle_rad: Array) -> Array
 
 
 def base_attitude(table: TableTruth, azimuth_deg: float) -> Array:
-    """Attitude B of the base, (3, 3): declared azimuth plus its error, and the base's tilt."""
+    """Attitude B of the base, from its axes to east, north, up, (3, 3): the declared azimuth plus its error, and the
+    tilt.
+    """
     heading = azimuth_deg * units.DEG + table.azimuth_error_arcsec * units.ARCSEC
     lay = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     lean = units.ARCSEC * np.array([[-table.base_tilt_north_arcsec, table.base_tilt_east_arcsec, 0.0]])

@@ -136,7 +136,9 @@ def _growth(s: Array) -> Array:
 
 
 def move_ticks(distance_deg: Array, limits: tuple[AxisLimits, ...], rate_hz: float) -> int:
-    """Whole ticks that a quintic move of all axes together needs within every axis' rate and acceleration."""
+    """Return the number of whole ticks that a quintic move of all axes together needs within every axis' rate and
+    acceleration.
+    """
     longest = 0.0
     for distance, limit in zip(np.abs(distance_deg).tolist(), limits, strict=True):
         by_rate = PEAK_RATE * distance / (MARGIN * limit.rate_deg_s)

@@ -67,7 +67,7 @@ def _recording(unit: SwungUnit, station: Station, channel: int, rng: np.random.G
     angles = np.zeros((len(read), 3))
     scatter = unit.encoder_sd_arcsec * units.ARCSEC * rng.standard_normal(len(read))
     angles[:, 0] = (amplitude * np.sin(omega * read + phase) + scatter) / units.DEG
-    rows = EncoderRows(0.0, unit.rate_hz).beside(count, EncoderTrace(read, angles, np.zeros(len(read))))
+    rows = EncoderRows(0.0, unit.rate_hz).next_rows(count, EncoderTrace(read, angles, np.zeros(len(read))))
     assert rows.shape == (count, len(ENCODER_CHANNELS))
     info = RecordingInfo(
         f"r{station.index}", "SWUNG", (*CHANNELS, *ENCODER_CHANNELS), unit.rate_hz, count, 0.0, station, simulated=True

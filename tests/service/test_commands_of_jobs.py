@@ -287,7 +287,7 @@ def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_pat
     (tmp_path / "no.pdf").write_bytes(b"%PDF-1.7\n")
     one_line(bench("certificate", "check", tmp_path / "no.pdf", "--certificate", tmp_path / "lab.cert.pem"), "PDF")
     assert bench("calibration", "reject", "SIM-0001", known, "--remark", "wrong unit").code == 0
-    one_line(bench(*make), "no certificate can be made of it: calibration")
+    one_line(bench(*make), "no certificate can be made of this calibration: calibration")
     refused = bench("calibration", "export", "SIM-0001", known, "--format", "excel")
     assert refused.code != 0
     assert "ardupilot" in refused.err

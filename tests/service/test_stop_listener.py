@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from bench_service.bench.stop.channel import StopChannel
-from bench_service.bench.stop.elsewhere import ListenerRoad, StopAddresses
 from bench_service.bench.stop.listener import CONNECTIONS, StopListener
 from bench_service.bench.stop.messages import Listening, made_secret, proof, read_secret
-from bench_service.bench.stop.road import Sent, StopRoads
+from bench_service.bench.stop.other_hosts import ListenerRoute, StopAddresses
+from bench_service.bench.stop.routes import Sent, StopRoutes
 from bench_service.bench.stop.word import StopWord
 from bench_service.model.errors import StorageFailure
 from bench_service.wall_clock import monotonic_s, pause
@@ -47,7 +47,7 @@ def at(listener: StopListener) -> Listening:
 
 def test_a_stop_is_taken_and_its_answer_is_believed(listener: StopListener, channel: StopChannel) -> None:
     word = StopWord("smoke", "Olena", "http")
-    safety = ListenerRoad("sim", at(listener), SECRET).ask(word).safety
+    safety = ListenerRoute("sim", at(listener), SECRET).ask(word).safety
     assert safety is not None
     assert safety.safe is True
     assert "the devices are safe" in safety.explanation
@@ -61,7 +61,7 @@ def test_without_the_secret_or_for_another_bench_nothing_is_taken(
     listener: StopListener, channel: StopChannel, bench: str
 ) -> None:
     secret = b"another secret, also long enough" if bench == "sim" else SECRET
-    assert ListenerRoad(bench, at(listener), secret).ask(StopWord("smoke", "Olena", "http")) == Sent(False)
+    assert ListenerRoute(bench, at(listener), secret).ask(StopWord("smoke", "Olena", "http")) == Sent(False)
     assert channel.standing() == ()
 
 
@@ -100,13 +100,13 @@ def test_what_is_no_message_ends_its_connection_and_nothing_else(
         assert bad.recv(100) == b""
     bad.close()
     assert channel.standing() == ()
-    assert ListenerRoad("sim", at(listener), SECRET).ask(StopWord("smoke", "Olena", "http")).taken
+    assert ListenerRoute("sim", at(listener), SECRET).ask(StopWord("smoke", "Olena", "http")).taken
 
 
 def test_idle_connections_keep_no_stop_out(listener: StopListener) -> None:
     idle = [connected(listener)[0] for _ in range(2 * CONNECTIONS)]
     begun_s = monotonic_s()
-    assert ListenerRoad("sim", at(listener), SECRET).ask(StopWord("smoke", "Olena", "http")).taken
+    assert ListenerRoute("sim", at(listener), SECRET).ask(StopWord("smoke", "Olena", "http")).taken
     assert monotonic_s() - begun_s < 2.0
     for each in idle:
         each.close()
@@ -127,7 +127,7 @@ def test_a_listener_that_lies_about_the_bench_is_not_believed(channel: StopChann
 
         thread = Thread(target=lie)
         thread.start()
-        assert ListenerRoad("sim", Listening(f"{host}:{port}", "x"), SECRET).ask(StopWord("a", "b", "http")) == Sent(
+        assert ListenerRoute("sim", Listening(f"{host}:{port}", "x"), SECRET).ask(StopWord("a", "b", "http")) == Sent(
             False
         )
         thread.join()
@@ -149,11 +149,11 @@ def test_addresses_are_kept_while_the_database_is_away(tmp_path: Path) -> None:
     while addresses.host("sim") != "bench-host":
         assert monotonic_s() < deadline
         pause(0.01)
-    assert addresses.road("sim") is None, "there is no secret yet"
+    assert addresses.route("sim") is None, "there is no secret yet"
     assert made_secret(secret) == made_secret(secret) == read_secret(secret)
     assert secret.stat().st_mode & 0o077 == 0
-    assert addresses.road("sim") is not None
-    assert addresses.road("another") is None
+    assert addresses.route("sim") is not None
+    assert addresses.route("another") is None
     addresses.end()
     secret.write_text("short")
     assert read_secret(secret) is None
@@ -167,8 +167,8 @@ def test_where_the_channel_of_this_host_takes_nothing_the_listener_is_asked(
     (folder / "bench-sim.stop").mkdir(parents=True)
     word = StopWord("smoke", "Olena", "http")
     nobody, somebody = (
-        StopRoads(folder).to("sim"),
-        StopRoads(folder, lambda bench: ListenerRoad(bench, at(listener), SECRET)).to("sim"),
+        StopRoutes(folder).to("sim"),
+        StopRoutes(folder, lambda bench: ListenerRoute(bench, at(listener), SECRET)).to("sim"),
     )
     assert nobody is not None
     assert somebody is not None

@@ -103,10 +103,10 @@ def test_a_sinusoid_that_goes_on_is_recorded_to_its_end_while_the_table_swings(q
 def test_a_reading_that_took_longer_than_a_recording_holds_is_refused() -> None:
     trace = EncoderTrace(np.array([0.1]), np.zeros((1, 3)), np.array([201.0]))
     with pytest.raises(DeviceFault, match="a reading of the table took 402 s: a recording holds at most 400 s"):
-        EncoderRows(0.0, 100.0).beside(100, trace)
+        EncoderRows(0.0, 100.0).next_rows(100, trace)
 
 
 def test_an_angle_beyond_what_a_recording_holds_is_refused() -> None:
     trace = EncoderTrace(np.array([0.1]), np.array([[0.0, -2001.0, 0.0]]), np.zeros(1))
     with pytest.raises(DeviceFault, match="an encoder reads 2001 deg: a recording holds no such angle"):
-        EncoderRows(0.0, 100.0).beside(100, trace)
+        EncoderRows(0.0, 100.0).next_rows(100, trace)

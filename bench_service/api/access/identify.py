@@ -59,7 +59,7 @@ class Found:
 
     def name(self, claimed: str | None) -> str | None:
         """Return the name under which a request acts: the proved one; where nobody logs in, the one that a client gives
-        itself.
+        itself. None: neither is there.
         """
         return self.proven_name or (claimed if self.claims else None)
 

@@ -74,8 +74,8 @@ class DevicesView(BaseModel):
     """The last state that a bench's devices reported, as the bench's own host has it."""
 
     at: datetime | None = Field(description="When the devices were last commanded; null: never")
-    by: str = Field(description="Person who asked for it")
-    job: str | None = Field(description="Job for which they were commanded")
+    by: str = Field(description="Process that last commanded the devices")
+    job: str | None = Field(description="Job for which the devices were last commanded")
     table: str = Field(description='"at rest", or "moving": a demand has not ended, from any process')
     angles_deg: tuple[float, float, float] | None = Field(
         description="Outer, middle, inner axis where the table last came to rest; null: not known"

@@ -19,7 +19,8 @@ async def stop_in_own_thread(
     stops: StopService, bench_id: str, reason: str, by: str, key: str | None = None, *, wait: bool = True
 ) -> Stopped:
     """Run `StopService.stop` in a thread of its own, outside the pool of all other routes, and return its outcome.
-    Raises what it raises, and `StorageFailure` where no thread can be made.
+    Raises what it raises, and `StorageFailure` where no thread can be made or none has answered within `LONGEST_S`.
+    `wait`: be `patient` there, unless many stops wait already.
     """
     global _waiting
     _waiting += 1

@@ -74,9 +74,11 @@ class NewsReader:
         return frame("bench", BenchNews(bench=view, job=shown).model_dump_json())
 
     def live(self, bench_id: str, known: News) -> BenchLive | None:
-        """Return the newest live state of a bench: of the own bench from memory, of others from the last reading."""
+        """Return the newest live state of a bench: of the own bench from memory, of others from the last reading. None:
+        it never had a driver.
+        """
         own = self._service.live
-        return own.said() if bench_id == own.own else known.lives.get(bench_id)
+        return own.own_live() if bench_id == own.own else known.lives.get(bench_id)
 
     async def events(self, job_id: str, after: int) -> tuple[int, bytes]:
         """Return the last sequence and the frame of a job's new events; an empty frame where there are none."""

@@ -23,7 +23,7 @@ class JobNews(BaseModel):
 
 
 class Beat(BaseModel):
-    """Sign of life: without it for three seconds the service is not to be taken for alive."""
+    """Heartbeat of the stream: a listener that gets none for three seconds takes the service as gone."""
 
     at: datetime
     trouble: str | None = Field(description="Why the service cannot read its database now")

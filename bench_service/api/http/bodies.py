@@ -30,9 +30,10 @@ def is_json(content_type: str | None) -> bool:
 
 
 async def only_plain_json(request: Request) -> None:
-    """Dependency of every route: refuses a JSON body that not everything can hold, by field, before it is used.
+    """Dependency of every route: refuses a JSON body with a value that the database or a client cannot hold, before it
+    is used.
 
-    Raises `RequestValidationError`.
+    Raises `RequestValidationError` with the fields.
     """
     if _takes_json(request.scope) and is_json(request.headers.get("content-type")) and await request.body():
         body = await request.body()
@@ -43,7 +44,9 @@ async def only_plain_json(request: Request) -> None:
 
 
 def refuse_unfit(document: object, place: str) -> None:
-    """Check a document, sent as `place`. Raises `RequestValidationError` with the values that cannot be stored."""
+    """Check the JSON of a request. `place`: where it was sent, "body" or the name of a form's field. Raises
+    `RequestValidationError` with the values that cannot be stored.
+    """
     found = list(islice(faults(document), TOLD))
     if found:
         raise RequestValidationError(

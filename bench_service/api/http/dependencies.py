@@ -50,8 +50,8 @@ By = Annotated[
 
 
 def as_utf8(text: str | None) -> str | None:
-    """Return a header's text as the UTF-8 that browsers send; a text that is not UTF-8 stays as it came (ISO
-    8859-1).
+    """Return a header's text, which browsers send as UTF-8, decoded; one that is not UTF-8 stays ISO 8859-1. None for
+    no header.
     """
     try:
         return None if text is None else text.encode("latin-1").decode("utf-8")

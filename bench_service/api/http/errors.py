@@ -58,8 +58,8 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 def binary(media_type: str) -> dict[str, Any]:
-    """Return the OpenAPI `content` of an answer of bytes. It is sent as `media_type`; generators of clients know the
-    second name.
+    """Return the OpenAPI `content` of an answer of bytes: under its `media_type`, and under octet-stream, which every
+    generator of clients knows.
     """
     schema = {"schema": {"type": "string", "format": "binary"}}
     return {media_type: schema, "application/octet-stream": schema}

@@ -140,7 +140,7 @@ class DemandView(BaseModel):
     key: str
     lease: str
     kind: DemandKind
-    values: dict[str, Any] = Field(description="The demand with what it left out")
+    values: dict[str, Any] = Field(description="Values of the demand, with defaults for those that it left out")
     by: str
     at: datetime
     state: str = Field(description='"accepted", "doing", "done", "refused", "failed" or "stopped"')

@@ -86,7 +86,9 @@ class CorrectionView(BaseModel):
     valid_until: datetime | None
     unusable: str = Field(description="Why it may not be used now, and the way out; empty where it may")
     decisions: list[DecisionView]
-    results: list[str] | None = Field(None, description="Results that rest on it; only where one is asked for")
+    results: list[str] | None = Field(
+        None, description="Results that rest on the correction, in the answer about this one alone"
+    )
 
     @classmethod
     def of(cls, stored: StoredCorrection, results: tuple[str, ...] | None = None) -> "CorrectionView":

@@ -200,7 +200,7 @@ class LiveBoard:
         self._said = replace(live, process=os.getpid())
         self.news.set()
 
-    def said(self) -> BenchLive | None:
+    def own_live(self) -> BenchLive | None:
         """Return the newest live state of the own bench from memory; None before the first one."""
         return self._said
 
@@ -245,13 +245,13 @@ class Heartbeat:
         self._ending.set()
         self._board.news.set()
         self._thread.join()
-        if (said := self._board.said()) is not None:
+        if (said := self._board.own_live()) is not None:
             self._write(replace(said, at=now(), driving=False, job=None, devices=None, samples=None, manual=None))
 
     def _run(self) -> None:
         while not self._ending.is_set():
             self._board.news.clear()
-            said = self._board.said()
+            said = self._board.own_live()
             if said is not None:
                 self._write(said if said.job or said.manual else replace(said, at=now()))
             self._board.news.wait(BEAT_S)

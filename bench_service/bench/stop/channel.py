@@ -127,8 +127,10 @@ class StopChannel:
                     write_record(file, number, record)
 
     def answer(self, role: int, answer: StopAnswer) -> None:
-        """Write the worker's or supervisor's answer to the stop requests: those seen, and those after which the bench
-        is safe. An unchanged answer is not written.
+        """Write the answer of worker or supervisor (`role`) to the stop requests: ids of those seen, and of those after
+        which the bench is safe.
+
+        An unchanged answer is not written. One that cannot be written is logged; the next call tries again.
         """
         if answer == self._answers[role]:
             return

@@ -7,7 +7,9 @@ from bench_service.bench.stop.word import DAMAGED, StopWord
 
 
 def words_in(page: bytes, leave_out_damaged: bool = False) -> tuple[StopWord, ...]:
-    """The stop requests in a page of records. Raises `Unreadable`, unless what is damaged is left out."""
+    """Return the stop requests in a page of records. Raises `Unreadable` for a damaged record, unless
+    `leave_out_damaged`.
+    """
     found: list[StopWord] = []
     for at in range(0, len(page), RECORD_BYTES):
         try:
@@ -21,7 +23,9 @@ def words_in(page: bytes, leave_out_damaged: bool = False) -> tuple[StopWord, ..
 
 
 def document_in(file: int, number: int) -> dict[str, Any] | None:
-    """The document of the stop request in a record; one that is unreadable counts as damaged. Raises `OSError`."""
+    """Return the document of the stop request in a record, None for an empty record; one that is unreadable counts as
+    damaged. Raises `OSError`.
+    """
     try:
         found = read_record(file, number)
         return found if found is None else _word(found).document()

@@ -12,7 +12,8 @@ FORMS = "2026-11-30T08:00:00Z, 2026-11-30 (midnight UTC), or how long ago: 90m, 
 
 
 def moment_of(option: str, text: str | None) -> str | None:
-    """Convert a moment to ISO 8601 with its zone; without a zone it is UTC, as commands print it.
+    """Convert a moment that a person typed to ISO 8601 with its zone; None stays None. Without a zone it is UTC, as
+    commands print it.
 
     Raises `Refused` with the forms that are understood.
     """

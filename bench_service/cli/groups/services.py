@@ -68,7 +68,9 @@ def demo(
         try:
             console.print(f"bench {settings.bench_id} at {address}")
             code = demonstrate(client, unit, seed, console)
-            if not once:
+            if once:
+                console.print("the service ends here; `bench serve` has the pages of these jobs", soft_wrap=True)
+            else:
                 console.print(f"serving on {address} (API: {address}/docs); Ctrl-C ends", soft_wrap=True)
                 _until_interrupted()
         finally:

@@ -30,7 +30,7 @@ def check_bench_file(path: Path, connect: bool, console: Console) -> int:
         console.print(line, soft_wrap=True)
     shown = ", ".join(unit.serial for unit in units) or f"none in {file.folder / 'units'}"
     console.print(f"units: {shown}", soft_wrap=True)
-    for line in found.limits_said(file):
+    for line in found.limit_differences(file):
         console.print(f"limit: {line}", soft_wrap=True)
     refused = _refusals(file, description, found, bool(units))
     for sentence in refused:

@@ -16,7 +16,8 @@ _given: list[int] = []
 
 
 def protect(settings: Settings) -> None:
-    """From now on make files for this user alone, and take away what others may do with those that exist.
+    """Make files for this user alone from now on, and take the permissions of others away from the service's files that
+    exist.
 
     A folder is closed to others where it holds nothing but the service's files: a home folder that a person put the
     database into stays open. What belongs to another user stays as it is.

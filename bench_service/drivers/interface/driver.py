@@ -111,7 +111,9 @@ class DeviceDriver(Generic[S]):
 
 
 def narrowest(declared: float, own: float | None, lower: bool) -> float:
-    """Return the narrower of a declared limit and the device's own; `own` None: the device does not report it."""
+    """Return the narrower of a declared limit and the device's own; `own` None: the device does not report it. `lower`:
+    True for a limit below which demands are refused.
+    """
     if own is None:
         return declared
     return max(declared, own) if lower else min(declared, own)

@@ -47,7 +47,8 @@ class Tape:
     """True once the recording has got a frame: frames lost before that do not count as lost."""
 
     def before(self, frames: int, now_s: float) -> int:
-        """Number of the oldest of some frames, the newest of which came just now, that were sampled before the begin.
+        """Return how many of the frames that were decoded just now were sampled before the recording's beginning; the
+        oldest are.
 
         Frames gather for `LISTEN_S` before they are decoded, so the first ones may be as much older. The sample of the
         k-th last of them began ``k·interval_s`` ago, but for the line's own delay and for half an interval.

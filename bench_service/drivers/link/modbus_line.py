@@ -44,7 +44,7 @@ class ModbusLine:
         return register.decode(await self._words(register.table, register.address, register.words))
 
     async def read_bit(self, bit: Bit) -> bool:
-        """Read one bit of a register and return it; raises as `read` does."""
+        """Read one bit of a register and return True where it is set; raises as `read` does."""
         return bit.of((await self._words(bit.table, bit.address, 1))[0])
 
     async def write(self, register: Register, value: float) -> None:

@@ -54,7 +54,9 @@ class State:
     """Switches as they came, which may be more than the layout has."""
 
     def bit(self, place: int | None) -> bool:
-        """Return whether the switch at a place is on; one that the layout does not have is off."""
+        """Return whether the switch at index `place` (from 0) is on; None, a switch that the layout does not have, is
+        off.
+        """
         return place is not None and self.digital[place] == "1"
 
 
@@ -87,7 +89,7 @@ def gradient_request(layout: Layout, up_k_min: float, down_k_min: float) -> byte
 
 
 def with_bit(digital: str, place: int, on: bool) -> str:
-    """Return the text of the switches with the one at a place set or cleared."""
+    """Return the digits of the switches, one a switch, with the one at index `place` (from 0) set to 1 or 0."""
     return digital[:place] + ("1" if on else "0") + digital[place + 1 :]
 
 

@@ -26,7 +26,7 @@ from procedures.bench.errors import BenchError, DeviceBusy, DeviceFault
 
 def unsafe_devices(state: DeviceState | None) -> frozenset[str]:
     """Return the names of the devices that the register has as unsafe; all where it knows nothing, or only that
-    something failed.
+    something failed. None: there is no register yet, and all are.
     """
     if state is None:
         return frozenset(SAFE_ORDER)
@@ -41,7 +41,9 @@ def unsafe_devices(state: DeviceState | None) -> frozenset[str]:
 
 
 def safe_state(kind: str, section: DeviceSection | None, state: DeviceState) -> dict[str, Any]:
-    """Return the fields of the register that change once a device was made safe, by the policy of its section."""
+    """Return the fields of the register that change once a device was made safe, by the policy of its section.
+    `section` None: the bench file has no such device.
+    """
     if isinstance(section, ChamberSection) and section.on_safe != "ambient":
         return {"chamber_target_c": None}
     return SAFE_STATE[kind](state)
@@ -69,12 +71,17 @@ class WiredDevices:
         return file
 
     def device_state(self) -> DeviceState | None:
-        """Return the devices' last noted state from the register; asks no device."""
+        """Return the devices' last noted state from the register; asks no device. None: no process of this host ever
+        had the link.
+        """
         return self._register.read()
 
     def compare(self, by: str) -> tuple[str, ...]:
-        """Connect to the real devices and return sentences about what differs from the register, which then takes over
-        what they say.
+        """Read the real devices, and return a sentence for each difference from the register.
+
+        Where there are differences the readings are written into the register. `by`: name of this process for the
+        holder of the link. Nothing is compared, and the tuple is empty, where another process has the link or the
+        register is new.
         """
         state, file = self._register.read(), self._file
         kinds: list[Kind] = [kind for kind in SAFE if kind in file.real()]

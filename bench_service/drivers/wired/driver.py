@@ -97,7 +97,8 @@ class BenchFileDriver:
         needs: BenchNeeds,
         job: str | None = None,
     ) -> Bench:
-        """Open the bench for a job. Real time continues while a service is down: there is nothing to continue from.
+        """Open the bench for a job. Real time continues while a service is down: there is nothing to continue from, and
+        `checkpoint` is not used. `seed`: of the simulated devices, None: 0. `job`: id of the job that takes the link.
 
         Raises `NotMounted`, `DeviceBusy`, `Disconnected` naming the devices that do not answer, and `DeviceFault` where
         a job needs what this bench cannot do, or where another device than before answers.
@@ -143,7 +144,7 @@ class BenchFileDriver:
         """Ask the devices for identity and limits; returns the failures, and describes the bench again."""
         found = survey(self._file)
         self._found |= found.found
-        for sentence in found.limits_said(self._file):
+        for sentence in found.limit_differences(self._file):
             if sentence not in self._told:  # it is asked before each job, and differs but rarely
                 log.warning("bench %s: %s", self._file.id, sentence)
             self._told.add(sentence)
@@ -219,7 +220,9 @@ class BenchFileDriver:
         self._register.journal.write(event, more, job=job)
 
     def device_state(self) -> DeviceState | None:
-        """Return the devices' last noted state from the register; asks no device."""
+        """Return the devices' last noted state from the register; asks no device. None: no process of this host ever
+        had the link.
+        """
         return self._devices.device_state()
 
     def compare(self, by: str) -> tuple[str, ...]:

@@ -54,7 +54,7 @@ class Survey:
     readings: dict[Kind, Any] = field(default_factory=dict[Kind, Any])
     failures: dict[Kind, Exception] = field(default_factory=dict[Kind, Exception])
 
-    def limits_said(self, file: BenchFile) -> tuple[str, ...]:
+    def limit_differences(self, file: BenchFile) -> tuple[str, ...]:
         """Return sentences about limits that differ between file and devices."""
         return tuple(
             f"{kind}.{sentence}"
@@ -64,7 +64,8 @@ class Survey:
 
 
 def survey(file: BenchFile, kinds: Iterable[Kind] | None = None) -> Survey:
-    """Connect to the real devices at the same time, wait, and return identities, limits and readings. Commands nothing.
+    """Connect to the real devices of the `kinds` (None: all) at the same time, wait, and return identities, limits and
+    readings. Commands nothing.
 
     A device that does not answer is among the failures, with its address.
     """

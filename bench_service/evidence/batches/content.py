@@ -29,7 +29,7 @@ def content_of(
     unit: Unit | None,
 ) -> str:
     """Return the digest (SHA-256, hexadecimal) of all that an analysis reads. `parameters`: as JSON, with their
-    defaults.
+    defaults. `unit` None: the method uses no unit's record.
     """
     read = [
         ["method", method, version],

@@ -34,8 +34,8 @@ class BatchStore(Protocol):
     def tasks(
         self, batch_id: str, *, state: TaskState | None = None, after: int | None = None, limit: int = 50
     ) -> tuple[AnalysisTask, ...]:
-        """Return at most `limit` tasks of a batch in the order of their numbers, those after the number `after`. Raises
-        `NotFound`.
+        """Return at most `limit` tasks of a batch in the order of their numbers, those after the number `after`, in
+        that `state` (None: any). Raises `NotFound`.
         """
         ...
 
@@ -58,7 +58,9 @@ class BatchStore(Protocol):
         result: str | None = None,
         failure: Failure | None = None,
     ) -> bool:
-        """Store the end of a claimed task; return False where the claim was lost meanwhile, and nothing is changed."""
+        """Store the end of a claimed task; return False where the claim was lost meanwhile, and nothing is changed.
+        `result`: id of the result that the task gave; `failure`: why it gave none.
+        """
         ...
 
     def put_back(
@@ -66,7 +68,8 @@ class BatchStore(Protocol):
     ) -> bool:
         """Put a claimed task back into its place in the queue; False where the claim was lost meanwhile.
 
-        `spent`: whether the attempt counts. A task of a cancelled batch is cancelled.
+        `not_before`: earliest time of the next attempt, None: at once. `spent`: whether this attempt counts. A task of
+        a cancelled batch is cancelled.
         """
         ...
 

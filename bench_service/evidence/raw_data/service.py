@@ -64,7 +64,7 @@ class RawDataService:
         self._open_archive = open_archive
 
     def remove(self, days: float | None, dry_run: bool, go_on: Callable[[], bool] = lambda: True) -> RawPlan:
-        """Remove the raw data of routine passes after `days` (None: as the settings say), or only plan it.
+        """Remove the raw data of routine passes after `days` (None: as the settings say), or only plan it (`dry_run`).
 
         Raises `BadParameter` where neither says how many days.
         """
@@ -77,7 +77,7 @@ class RawDataService:
         return plan
 
     def archive(self, days: float | None, dry_run: bool, go_on: Callable[[], bool] = lambda: True) -> RawPlan:
-        """Move the raw data of complete recordings to the archive after `days`, or only plan it.
+        """Move the raw data of complete recordings to the archive after `days`, or only plan it (`dry_run`).
 
         Raises `BadParameter` without an archive or days, `ArchiveAway` where it cannot be written at all.
         """

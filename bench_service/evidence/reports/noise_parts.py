@@ -23,7 +23,9 @@ NOT_SEEN = "≤: no launch showed the process; the value is the one to plan with
 
 
 def origin(record: TriadRecord | None) -> str:
-    """Return the origin of a triad's noise in the record as text: a data sheet, or a result."""
+    """Return the origin of a triad's noise in the record as text: a data sheet, or a result. None: the noise is not
+    known.
+    """
     return "nothing is known" if record is None else record.noise_origin
 
 
@@ -65,7 +67,8 @@ def noise_trends(
     """Yield figures of noise coefficients over the unit's static launches, oldest first; none with fewer than two
     results.
 
-    `newest`: only this result and older ones; None: up to the unit's newest.
+    `simulated`: of recordings of a simulated bench, or of real ones. `newest`: only this result and older ones; None:
+    up to the unit's newest.
     """
     documents = [d["channels"] for d in _documents(stores, serial, simulated, newest)][::-1]
     if len(documents) < 2:

@@ -23,7 +23,9 @@ def named(by: str, proven: bool) -> str:
 
 
 def people(result: StoredResult, job: Job | None) -> Iterator[Block]:
-    """Yield the rows on who asked for the work, and on the times of the job and of the result."""
+    """Yield the rows on who asked for the work, and on the times of the job and of the result. `job` None: a result of
+    a method.
+    """
     yield Heading("Who and when")
     rows = [("result", moment(result.created_at))]
     if job is not None:

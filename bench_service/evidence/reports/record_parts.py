@@ -27,8 +27,8 @@ def found_and_left(
     given: Sequence[StoredCalibration],
     job: Job | None,
 ) -> Iterator[Block]:
-    """Yield the section on what was in use when the job began next to what the result gave, and noise where it
-    changed.
+    """Yield the section on what was in use when the job began next to what the result gave, and noise where it changed.
+    `found` by triad; `given`: calibrations of the result; `job` None: a result of a method.
     """
     unit = result.context.get("unit")
     if not unit:

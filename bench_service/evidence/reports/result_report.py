@@ -51,7 +51,7 @@ class ResultReport:
 
 
 def gathered(stores: EvidenceStores, result: StoredResult, job: Job | None) -> ResultReport:
-    """Return all that a result's report is made of, read from the stores."""
+    """Return all that a result's report is made of, read from the stores. `job` None: a result of a method."""
     given = stores.calibrations.of_results([result.id])
     return ResultReport(result, job, tuple(given), calibration_parts.found_before(stores, result))
 

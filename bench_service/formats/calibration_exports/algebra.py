@@ -10,7 +10,7 @@ from procedures.core.imu_model import TriadCalibration
 
 @dataclass(frozen=True)
 class InverseModel:
-    """Inverse model ``v = A·U + c`` with A = K⁻¹ and c = −K⁻¹·b."""
+    """Inverse model ``v = A·U + c`` of a calibration: A = K⁻¹, c = −K⁻¹·b, and the covariance of A and c."""
 
     matrix: Array
     """A (3, 3), input unit a output unit."""

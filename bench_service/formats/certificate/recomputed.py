@@ -72,9 +72,9 @@ def require_issuable(document: Mapping[str, Any], failed: bool) -> None:
     for triad in document["triads"]:
         validity = triad["validity"]
         if validity["unusable"]:
-            raise CertificateRefused(f"no certificate can be made of it: {validity['unusable']}")
+            raise CertificateRefused(f"no certificate can be made of this calibration: {validity['unusable']}")
         if validity["verdict"] not in (None, "pass") and not failed:
             raise CertificateRefused(
-                f"no certificate can be made of it: the verdict on calibration {triad['calibration']} of the "
-                f"{triad['triad']} triad is {validity['verdict']}; with --failed a certificate states that"
+                f"no certificate can be made of this calibration: the verdict on calibration {triad['calibration']} of "
+                f"the {triad['triad']} triad is {validity['verdict']}; with --failed a certificate states that"
             )

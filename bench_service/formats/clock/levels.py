@@ -115,7 +115,9 @@ def in_order(rows: NDArray[np.int64], samples: NDArray[np.int64], ahead: int) ->
 
 
 def without_slips(places: Places) -> Places:
-    """Without single samples that are lost, or too many, at equal distances: a coarse clock a little off its rate."""
+    """Return the places without those of a coarse clock a little off its rate: where each is one sample lost, or each
+    one too many, at equal distances, none is left; else all are as they were.
+    """
     apart = np.diff(places.rows)
     if len(apart) < 2 or np.any(places.samples != places.samples[0]) or abs(int(places.samples[0])) != 1:
         return places

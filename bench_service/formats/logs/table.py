@@ -124,7 +124,9 @@ class LogFormat(Protocol):
 
 
 def find_table(log: Log, name: str, wanted: str | None, columns: Sequence[str]) -> LogTable:
-    """Return the table that is asked for, or the only one that has all the columns. Raises `UnreadableFile`."""
+    """Return the table named `wanted`, or, where None, the only table that has all the columns. Raises
+    `UnreadableFile`.
+    """
     tables = log.tables()
     if wanted is not None:
         found = [t for t in tables if t.name == wanted]
@@ -158,7 +160,7 @@ def as_numbers(values: Numbers) -> Numbers:
 def triad(
     names: Sequence[str], kind: str, quantity: Quantity, unit: str | None, scale: float = 1.0, source: str = ""
 ) -> tuple[LogColumn, ...]:
-    """Return the columns of three axes x, y, z; `kind`: gyro or accelerometer."""
+    """Return the columns of three axes x, y, z; `kind`: gyro or accelerometer; `unit` None: the file does not say."""
     return tuple(
         LogColumn(name, quantity, unit, scale, 0.0, f"{kind}_{axis}", source)
         for name, axis in zip(names, "xyz", strict=True)

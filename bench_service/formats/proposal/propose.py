@@ -31,6 +31,9 @@ NAMED_BY_PEOPLE = ("text", "phone", "xsens", "ros", "parquet", "arrow", "mat5", 
 def propose(file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
     """Return a proposed description of one file; reads all rows. Raises `UnreadableFile`, `UnfitRecording`,
     `BadParameter`.
+
+    `unit`: serial of the unit; None: a person is asked for it. `form`, `table`: None: recognised by the content of the
+    file.
     """
     found = format_of(file.stream, form)
     opened = Opened(file, None if found is None else found.opened(file.stream, file.name))

@@ -78,7 +78,9 @@ def _force_unit(columns: Sequence[LogColumn], places: Sequence[int], values: Val
 
 
 def suspicions(columns: Sequence[LogColumn], values: Values, rate_hz: float | None) -> list[str]:
-    """Return sentences about values that no unit of these scales at rest has, and about channels that do not move."""
+    """Return sentences about values that no unit of these scales at rest has, and about channels that do not move.
+    `rate_hz` None: not known; increments are then not compared with gravity.
+    """
     found = [
         f"channel {c.channel} ({c.name}) has one value throughout: {values.means[i]:.6g}"
         for i, c in enumerate(columns)

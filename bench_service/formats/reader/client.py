@@ -149,7 +149,7 @@ class FileReader:
             yield _Reading(description, found["rate_hz"], found["count"], dtype, found["source"], line)
 
     def describe(self, file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
-        """Return a proposed description of a file; `unit`, `form` and `table` where they are known.
+        """Return a proposed description of a file; `unit`, `form`, `table` as in `propose`.
 
         Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`, and `NoRoom`, `NoReader`.
         """

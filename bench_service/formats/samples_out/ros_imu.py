@@ -63,7 +63,7 @@ ABSENT = -1.0
 
 def imu_messages(stamps_ns: np.ndarray, rates: Array | None, forces: Array | None) -> np.ndarray:
     """Return the messages of samples in CDR, (n, bytes): `stamps_ns` (n,) from the epoch, rates (n, 3) in rad/s,
-    specific forces (n, 3) in m/s².
+    specific forces (n, 3) in m/s². None: a triad that the recording does not have.
     """
     made = np.zeros(len(stamps_ns), MESSAGE)
     made["encapsulation"] = b"\x00\x01\x00\x00"

@@ -111,8 +111,8 @@ def _described(part: Extract) -> dict[str, str]:
 
 
 def physical_sheet(part: Extract, blocks: Iterable[RawArray], treatment: Treatment | None = None) -> Sheet:
-    """Return samples as a sheet in SI units, corrected and decimated where wanted. Raises `BadParameter` for a
-    calibration that does not fit the channels.
+    """Return samples as a sheet in SI units, corrected and decimated by the `treatment` (None: neither). Raises
+    `BadParameter` for a calibration that does not fit the channels.
     """
     asked = treatment or Treatment()
     if not 1 <= asked.decimate <= LARGEST_FACTOR:

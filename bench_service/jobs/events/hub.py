@@ -212,7 +212,7 @@ class EventHub:
         if watch.state in OVER or at_s - watch.live_at_s < max(PUBLISH_S, rest_s):
             return
         own = watch.bench == self._board.own
-        live = self._board.said() if own else await asyncio.to_thread(self._board.of_bench, watch.bench)
+        live = self._board.own_live() if own else await asyncio.to_thread(self._board.of_bench, watch.bench)
         watch.live_at_s = at_s
         if live is None or live.job is None or live.job.id != watch.job_id or live == watch.live_told:
             return

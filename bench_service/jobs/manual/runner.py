@@ -10,7 +10,7 @@ from threading import Event, Lock
 from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
-from bench_service.bench.make_safe import RoadEnd, has_register, over_new_link, still_unsafe, whole_road
+from bench_service.bench.make_safe import SafetyOutcome, end_safely, has_register, over_new_link, still_unsafe
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.worker_time_limits import ENDING_S
 from bench_service.jobs.manual.reader import LeaseReader
@@ -52,7 +52,7 @@ class ManualRunner:
         self._by = f"the worker, {ProcessIdentity.own()}"
         self._session: ManualSession | None = None
         self._reader: LeaseReader | None = None
-        self._road = Lock()
+        self._making_safe = Lock()
         """Held while a thread makes the bench of a lease safe: the stop guard's or the lease's own."""
         self._wake = Event()
         self._ending = Event()
@@ -96,7 +96,7 @@ class ManualRunner:
         if (reader := self._reader) is not None:
             reader.end_delivery()
         if has_register(self._driver):  # else the session's own link is the only one
-            self._whole_road(session)
+            self._end_safely(session)
 
     def shut_down(self) -> None:
         """End the lease that runs, and wait until the bench is safe: the service is ending."""
@@ -137,20 +137,20 @@ class ManualRunner:
             because = f"{type(error).__name__}: {error}"
         finally:
             reader.end_delivery()
-            end = self._whole_road(session)
+            end = self._end_safely(session)
             reader.end(WRITE_S)
         detour = f"; made safe over a new link: {end.detour}" if end.detour else ""
         self._ended(lease, because + detour, None if end.obstacle is None else end.obstacle.reason)
         if ending:
             raise ShuttingDown
 
-    def _whole_road(self, session: ManualSession) -> RoadEnd:
+    def _end_safely(self, session: ManualSession) -> SafetyOutcome:
         def given_back() -> None:
             if self._session is session:
                 self._session = None
 
-        with self._road:
-            return whole_road(session, self._driver, self._by, given_back)
+        with self._making_safe:
+            return end_safely(session, self._driver, self._by, given_back)
 
     def _ended(self, lease: ManualLease, because: str, unsafe: str | None) -> None:
         """Note the end of a lease; where the bench is not safe it is stopped. What is not noted now is closed later.

@@ -58,7 +58,9 @@ class ManualService:
         if request.reservation is not None:
             self._queues.usable(request.reservation, request.bench, unit)
         if not self._benches.driven(request.bench):
-            raise NotDriving(f"no worker drives bench {request.bench} now: manual mode needs one")
+            raise NotDriving(
+                f"no worker drives bench {request.bench} now, and manual mode needs one: start `bench worker`"
+            )
         at = now()
         until = at + timedelta(minutes=_minutes(request.minutes))
         lease = copied(ManualLease, request, id=new_id(), unit=unit, created_at=at, until=until)

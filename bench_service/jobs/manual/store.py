@@ -63,8 +63,8 @@ class ManualStore(Protocol):
         ...
 
     def end(self, lease_id: str, at: datetime, because: str, safe: bool | None) -> None:
-        """End a lease, with the reason and whether the bench is safe; its open demands become stopped. A second end
-        changes nothing.
+        """End a lease, with the reason and whether the bench is safe (`safe` None: not known); its open demands become
+        stopped. A second end changes nothing.
         """
         ...
 

@@ -18,7 +18,7 @@ from bench_service.model.raw_data import RawState
 from bench_service.persistence.archive.chunks import archived_chunk, chunk_name
 from bench_service.persistence.archive.places import place_at
 from bench_service.persistence.database import Database
-from bench_service.persistence.parts import in_parts
+from bench_service.persistence.slices import in_parts
 from bench_service.persistence.tables.evidence import (
     ChunkRow,
     RecordingRow,

@@ -52,7 +52,7 @@ class HostFiles:
         self._write(True)
 
     def supervisor(self) -> ProcessIdentity | None:
-        """Return the process that supervises the bench on this host, if one is alive."""
+        """Return the process that supervises the bench on this host, or None where none is alive."""
         try:
             process = ProcessIdentity(**json.loads(self._supervisor.read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):

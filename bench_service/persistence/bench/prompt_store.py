@@ -31,7 +31,9 @@ class SqlPromptStore:
         with self._database.write() as session:
             row = found_job(session, job_id, lock=True)
             if row.prompt is None or "answer" in row.prompt:
-                raise IllegalTransition(f"job {job_id} has no open prompt")
+                raise IllegalTransition(
+                    f"job {job_id} has no open prompt: it was answered or withdrawn, or there was none"
+                )
             if row.prompt.get("id", "") != prompt_id:
                 text = f"job {job_id} has a newer prompt; this answer is to an older one: read the job again"
                 raise IllegalTransition(text)

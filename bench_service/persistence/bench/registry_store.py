@@ -13,7 +13,7 @@ from bench_service.model.errors import IllegalTransition, NotFound, TooManyStops
 from bench_service.model.records import BenchStop, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.tables.bench import BenchRow, BenchStopRow
 from procedures.bench import BenchDescription
 

@@ -118,7 +118,7 @@ class SqlBatchQueue:
         return len(rows)
 
     def settle(self, batch_id: str, at: datetime | None) -> None:
-        """Close a batch whose tasks have all ended, and keep their counts; nothing for one with open tasks.
+        """Close a batch at a time where its tasks have all ended, and store their counts; do nothing while one is open.
 
         It runs after the commit of a task's end: of two workers that end the last two tasks at once, the later one
         finds none open.

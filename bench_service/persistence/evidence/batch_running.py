@@ -81,7 +81,7 @@ def runner_maker(
     database: Database, database_url: str, code_version: str, closing: ExitStack, apart: bool
 ) -> RunnerMaker | None:
     """Return the function that builds the runner of a service; None on Postgres, where workers run the tasks (`bench
-    worker --analyse`).
+    worker --analyse`). `apart`: tasks run in processes of their own; False: in a thread of this one.
     """
     if database.is_postgres:
         return None

@@ -18,9 +18,9 @@ from bench_service.persistence.evidence.batch_rows import (
     task_of_row,
 )
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
-from bench_service.persistence.pages import page
-from bench_service.persistence.parts import in_parts
+from bench_service.persistence.paging import page
 from bench_service.persistence.searching import find_recordings
+from bench_service.persistence.slices import in_parts
 from bench_service.persistence.tables.batches import BatchRow, TaskRecordingRow, TaskRow
 from bench_service.persistence.tables.evidence import RecordingRow
 from bench_service.persistence.tables.jobs import JobRow

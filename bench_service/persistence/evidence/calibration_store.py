@@ -13,7 +13,7 @@ from bench_service.model.records import Idempotency, Page, StoredResult
 from bench_service.persistence.database import Database
 from bench_service.persistence.evidence.calibration_rows import calibrations_where, complete, decision_row, rows_of
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.tables.evidence import CalibrationRow, ResultCalibrationRow
 from bench_service.persistence.tables.jobs import JobRow
 from procedures.core.imu_model import TriadCalibration

@@ -29,7 +29,9 @@ CORRECTION = TypeAdapter(UnitCorrection)
 def correction_of_row(
     row: CorrectionRow, verdict: str, of_job: bool, decisions: Sequence[CorrectionDecisionRow] = ()
 ) -> StoredCorrection:
-    """Convert a row with its result's verdict and its decisions, oldest first, to a stored correction."""
+    """Convert a row with its result's verdict and its decisions, oldest first, to a stored correction. `of_job`: the
+    result gave a job its verdict.
+    """
     return copied(
         StoredCorrection,
         row,
@@ -81,7 +83,9 @@ def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
 
 
 def retire_current(session: Session, unit: str | None, kind: str) -> None:
-    """Make the unit's current correction of that kind no longer current, in this transaction."""
+    """Make the unit's current correction of that kind no longer current, in this transaction. Without one (or for
+    `unit` None) nothing is changed.
+    """
     session.execute(
         update(CorrectionRow)
         .where(CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current)

@@ -15,7 +15,7 @@ from bench_service.model.records import Idempotency, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.evidence.correction_rows import corrections_where, retire_current
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.tables.evidence import (
     CorrectionDecisionRow,
     CorrectionRow,

@@ -22,7 +22,7 @@ def require_raw(row: RecordingRow) -> None:
 def payload_elsewhere(database: Database, recording_id: str, number: int, sha256: str) -> bytes:
     """Return the bytes of a chunk that is empty in the database, from the archive and checked against its hash.
 
-    The place is looked up now, not when the reader was opened: the data may have moved meanwhile. Raises
+    The place is looked up now, not when the reader was opened: the data may have moved meanwhile. Raises `NotFound`,
     `RawDataRemoved`, `ArchiveAway`, `DamagedRecording`.
     """
     with database.read() as session:

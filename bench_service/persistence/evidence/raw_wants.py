@@ -5,7 +5,7 @@ from sqlalchemy.orm import Session
 
 from bench_service.model.batches import TaskState
 from bench_service.model.calibrations import Approval
-from bench_service.persistence.parts import in_parts
+from bench_service.persistence.slices import in_parts
 from bench_service.persistence.tables.batches import TaskRecordingRow, TaskRow
 from bench_service.persistence.tables.evidence import (
     CalibrationRow,

@@ -23,7 +23,7 @@ from bench_service.persistence.evidence.chunk_reader import ChunkReader
 from bench_service.persistence.evidence.raw_places import require_raw
 from bench_service.persistence.evidence.recording_rows import info_of_row, stored_of_row
 from bench_service.persistence.evidence.recording_writer import SqlRecordingWriter
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.searching import find_recordings
 from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
 from bench_service.persistence.text_search import ways_to_recordings
@@ -103,7 +103,9 @@ class SqlRecordingStore:
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
     ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
-        """Yield samples, see `RecordingStore.read`; `start` and `stop` beyond the ends are taken as the ends."""
+        """Yield samples of the named channels (None: all), see `RecordingStore.read`; `start` and `stop` beyond the
+        ends are taken as the ends.
+        """
         with self._database.read() as session:
             row = _found(session, recording_id)
             require_raw(row)

@@ -83,10 +83,11 @@ class SqlRecordingWriter:
                 self._hand_over()
 
     def seal(self, checkpoint: dict[str, Any] | None = None, measured: Measured | None = None) -> RecordingInfo:
-        """Write the rest and complete the recording. Where the job's station is complete already, that one is returned.
+        """Write the rest and complete the recording. Where the job's station has a complete recording already, its
+        description is returned. Raises `UnfitRecording` without a sample, `StorageFull`, `StorageFailure`.
 
-        The second happens when a step is repeated because the process died between its last commit and its note
-        that it was done: the first recording stands, this one leaves nothing.
+        The second happens when a step is repeated because the process died between its last commit and its note that it
+        was done: the first recording stands, this one leaves nothing.
         """
         if self._sealed is not None:
             return self._sealed

@@ -34,7 +34,7 @@ from bench_service.persistence.evidence.result_values import (
     values_query,
 )
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.searching import find_results
 from bench_service.persistence.tables.batches import ResultContentRow
 from bench_service.persistence.tables.evidence import (

@@ -48,7 +48,7 @@ class SqlWorkerNames:
                 return LeasedName(name, acquire_lease(self._database_url, name, ANALYSES))
             except BenchBusy:  # another worker was faster
                 continue
-        raise Overloaded(f"{MOST} workers analyse on this database already")
+        raise Overloaded(f"{MOST} workers analyse on this database already, the most that may: end one of them first")
 
     def alive(self, name: str) -> bool:
         return lease_holder(self._database, self._database_url, name) is not None

@@ -44,7 +44,9 @@ def move_job(
     failure: Failure | None = None,
     result_id: str | None = None,
 ) -> None:
-    """Change the state of a locked row and its dependent fields, and append an event. Raises `IllegalTransition`."""
+    """Change the state of a locked row and its dependent fields (None: as they are), and append an event. Raises
+    `IllegalTransition`.
+    """
     before = state_of_row(row)
     if to not in LEGAL[before]:
         raise IllegalTransition(f"job {row.id} is {before.value}; it cannot become {to.value}")

@@ -20,7 +20,7 @@ from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.jobs.job_changes import append_event, found_job, move_job
 from bench_service.persistence.jobs.job_rows import event_of_row, job_of_row, row_of_job, state_of_row
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.searching import find_jobs
 from bench_service.persistence.tables.jobs import EventRow, JobLabelRow, JobRow
 from bench_service.persistence.text_search import ways_to_jobs

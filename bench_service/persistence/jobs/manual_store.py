@@ -17,7 +17,7 @@ from bench_service.persistence.bench.registry_store import standing_stops
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.jobs.reservation_store import active_reservations
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.tables.jobs import JobRow
 from bench_service.persistence.tables.manual import ManualDemandRow, ManualLeaseRow
 

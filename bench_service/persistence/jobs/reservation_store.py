@@ -12,7 +12,7 @@ from bench_service.model.errors import AlreadyReserved, NotFound
 from bench_service.model.records import Idempotency, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.tables.jobs import ReservationRow
 
 

@@ -241,7 +241,9 @@ class ResultCalibrationRow(Table):
 
 
 class CorrectionRow(Table):
-    """A correction set of a unit, of the kind "thermal", "converter" or "thermometers"; one of a kind is current."""
+    """A correction set of a unit, of the kind "thermal", "converter", "thermometers" or "gyros"; at most one of a kind
+    is current.
+    """
 
     __tablename__ = "corrections"
     __table_args__ = (

@@ -11,7 +11,7 @@ from bench_service.mapping import copied
 from bench_service.model.errors import IllegalTransition
 from bench_service.model.records import Page
 from bench_service.persistence.database import Database
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.tables.telemetry import AuditCheckpointRow, AuditRow
 from bench_service.telemetry.audit import AuditEntry
 from bench_service.telemetry.audit_chain import BEGINNING, ChainCheck, ChainReport, Checkpoint, Link

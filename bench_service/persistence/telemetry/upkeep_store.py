@@ -7,7 +7,7 @@ from sqlalchemy import select, update
 from bench_service.mapping import copied
 from bench_service.model.records import Page
 from bench_service.persistence.database import Database
-from bench_service.persistence.pages import page
+from bench_service.persistence.paging import page
 from bench_service.persistence.tables.telemetry import UpkeepRow
 from bench_service.telemetry.upkeep import UpkeepKind, UpkeepReport
 

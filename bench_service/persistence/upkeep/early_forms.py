@@ -18,7 +18,9 @@ _INDEXES = {
 
 
 def mend(connection: Connection, revision: str | None) -> list[str]:
-    """Add what a database of this revision lacks of migration 0004; return the names of the parts that were added."""
+    """Add what a database of this revision lacks of migration 0004; return the names of the parts that were added.
+    Nothing in an empty database (None), or in one outside the revisions `FIRST` … `LAST`.
+    """
     if revision is None or not FIRST <= revision <= LAST:
         return []
     from alembic.migration import MigrationContext

@@ -7,7 +7,7 @@ from bench_client.results.shared import Check, Statement, Verdict
 
 
 class CrossCoupling(Part):
-    """Repeatability of one cross-coupling over n mountings; plain numbers in radians, JSON-ready."""
+    """Repeatability of one cross-coupling over n mountings, in radians."""
 
     triad: str
     """Triad: gyro or accelerometer"""

@@ -7,7 +7,7 @@ from bench_client.results.shared import Check, Statement, Verdict
 
 
 class Scatter(Part):
-    """Sample standard deviation of one coefficient over n calibrations; plain numbers, JSON-ready."""
+    """Sample standard deviation of one coefficient over n calibrations."""
 
     triad: str
     """Triad: gyro or accelerometer"""

@@ -19,7 +19,7 @@ class Limit(Part):
 
 
 class Decision(Part):
-    """How one value was decided: rule, outcome, expanded uncertainty, guard band."""
+    """Record of how one value was decided: rule, outcome, expanded uncertainty, guard band."""
 
     rule: str
     """Rule in words; a test of significance is held at its level, without a guard band."""
@@ -134,7 +134,7 @@ class StationResidual(Part):
 
 
 class Magnitudes(Part):
-    """|v̂| at n stations before and after correction, in SI; plain tuples, JSON-ready."""
+    """|v̂| at n stations before and after correction, with their means and spreads, in SI."""
 
     triad: str
     """Triad: gyro or accelerometer"""
@@ -235,7 +235,7 @@ class Budget(Part):
 
 
 class TriadSummary(Part):
-    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets. JSON-ready."""
+    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets."""
 
     calibration: TriadCalibration
     """Calibration of the triad"""
@@ -275,7 +275,7 @@ Form = Literal["both", "switched", "single"]
 
 
 class ThermalShare(Part):
-    """Effect of the thermal correction on a calibration, JSON-ready."""
+    """Effect of the thermal correction on a calibration."""
 
     form: Form
     """Form of the thermal correction"""
@@ -444,7 +444,7 @@ class AxisCorrection(Part):
 
 
 class TemperatureRange(Part):
-    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
+    """Readings of the two sensors, least and greatest, between which a correction was fitted [°C]."""
 
     case_c: tuple[float, ...]
     """Lowest and highest reading of the case's sensor [°C]"""
@@ -464,9 +464,7 @@ class SensorCorrection(Part):
 
 
 class ThermometerCorrection(Part):
-    """Corrections of a unit's sensors. Raises `BadParameter` for numbers that are not finite or do not fit
-    together.
-    """
+    """Corrections of a unit's temperature sensors, with their common covariance."""
 
     sensors: tuple[SensorCorrection, ...]
     """Thermometers, one entry each"""
@@ -486,9 +484,9 @@ class ThermalCorrection(Part):
     axes: tuple[AxisCorrection, ...]
     """Correction of each axis, x, y, z"""
     first_stage: tuple[ConverterModel, ...] | None = None
-    """The converter's models that were taken out of the outputs before the fit (`core.converter.at_reference`),
-    and so must be wherever the correction is used; None: it is for outputs as they are. The reference of the
-    whole is then these models' for the converter's own drift, and the axes' for the rest: best the same.
+    """The converter's models that were taken out of the outputs before the fit, and so must be wherever the
+    correction is used; None: it is for outputs as they are. The reference of the whole is then these models'
+    for the converter's own drift, and the axes' for the rest: best the same.
     """
     fitted_range: TemperatureRange | None = None
     """Temperature range of the fit; beyond it the correction extrapolates. None: not known (older versions)."""

@@ -342,7 +342,7 @@ class ThermalCycle(Part):
     hysteresis: tuple[Hysteresis, ...] = ()
     """Difference between soaks reached from below and from above"""
     gyro_correction: GyroThermalCorrection | None = None
-    """For gyros that depend on temperature; None where none does."""
+    """Correction of the gyros that depend on temperature; None where none does."""
     gyros_corrected: tuple[GyroCorrected, ...] = ()
     """Gyros with a dependence, and what a correction leaves"""
 

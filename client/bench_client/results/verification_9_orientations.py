@@ -39,7 +39,9 @@ class Movement(Part):
 
 
 class TriadDiagnosis(Part):
-    """Scored changes of a triad, the largest first, and what the residuals say as a whole; JSON-ready."""
+    """Scored changes of a triad, the largest first, and what the residuals say as a whole: their p-values, and
+    movements outside the triad that would explain them.
+    """
 
     triad: str
     """Triad: gyro or accelerometer"""
@@ -58,9 +60,7 @@ class TriadDiagnosis(Part):
 
 
 class TriadVerification(Part):
-    """Verification result of one triad: magnitudes, their test against the prediction, and the diagnosis. JSON-
-    ready.
-    """
+    """Verification result of one triad: magnitudes, their test against the prediction, and the diagnosis."""
 
     magnitudes: Magnitudes
     """Errors of the magnitude at the stations"""

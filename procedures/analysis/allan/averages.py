@@ -90,10 +90,7 @@ class BlockMeans:
         self._done += whole
 
     def means(self) -> Array:
-        """Return the block means a_b, (count
-
-        s,), of all samples so far.
-        """
+        """Return the means of the running sum over each whole block so far, (count // size,)."""
         return self.begins[:-1] + self._means
 
 

@@ -30,7 +30,7 @@ def deviations(
     Each is what `deviation.deviation` finds: exact sizes to rounding; the larger ones of a long series, whose claim is
     0.1 %, to some 10⁻⁵, as the windows of the longest member serve all. The time deviation is the modified one times
     τ/√3, and is not summed for itself. A statistic for which the fast sums would lose accuracy is differenced alone,
-    term by term. Raises `UnfitRecording` and `BadParameter`.
+    term by term. Raises `UnfitRecording` and `BadParameter`. `increments` as in `DeviationStream`.
     """
     count = len(samples)
     wanted = {statistic: checked_sizes(own, count, statistic) for statistic, own in sizes.items()}

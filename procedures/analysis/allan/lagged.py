@@ -64,8 +64,8 @@ class LaggedProducts:
         return products - _inverse(_paired(self._seams), 2 * self._reach)[: self._reach]
 
     def spectrum(self) -> Array:
-        """Return the mean over the windows of each one's part of `energies` by frequency, (length/2 + 1,), its sum near
-        1.
+        """Return the mean over the windows of each window's share of `energies` by frequency, (length/2 + 1,); the sum
+        is near 1.
         """
         return _paired(self._shape * self._response) / (len(self.ends) - 1)
 

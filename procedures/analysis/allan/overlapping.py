@@ -41,8 +41,11 @@ def exact_limit(statistic: Statistic, count: int) -> int:
 
 
 def strides_of(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
-    """Return the samples between the starts that a size uses, (k,): 1, s, or 4s for sizes of at least `LONG` held
-    points.
+    """Return the distances between the starts of successive terms at each cluster size [samples], (k,).
+
+    1, every start, for a series held whole, a statistic without overlap, and sizes up to `exact_limit`; above it the
+    step s of the held points (`stride_of`), and 4s for sizes of `LONG`·s samples and more. `count`: samples of the
+    series.
     """
     s = stride_of(count)
     if s == 1 or not statistic.overlapping:
@@ -52,7 +55,9 @@ def strides_of(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
 
 
 def snapped_sizes(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
-    """Return the sizes as they will be computed, (k,): multiples of the strides they use."""
+    """Return the sizes at which the sums will be computed, ascending, each once: multiples of the distances of their
+    starts (`strides_of`).
+    """
     s = strides_of(sizes, statistic, count)
     return np.unique(np.minimum(np.round(sizes / s).astype(np.int64), statistic.largest(count) // s) * s)
 

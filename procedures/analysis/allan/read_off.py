@@ -59,8 +59,8 @@ class ReadOff:
 
 
 def read_off(deviation: Deviation) -> ReadOff:
-    """Return the lines of an Allan deviation of a rate (overlapping or not). Raises `BadParameter` for another
-    statistic.
+    """Return, for each noise process, the stretch of an Allan plot that has its slope, and the coefficient read there.
+    `deviation`: of a rate, overlapping or not. Raises `BadParameter` for another statistic.
     """
     if deviation.statistic.order != 2 or deviation.statistic.modified:
         raise BadParameter("statistic", deviation.statistic.name, "allan or overlapping_allan")

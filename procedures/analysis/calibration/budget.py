@@ -169,7 +169,9 @@ def row_of(
     divisor: float = 1.0,
     freedom: float | None = None,
 ) -> BudgetRow:
-    """Return one row of a budget, with the sensitivity that its contribution implies."""
+    """Return one row of a budget, with the sensitivity that its contribution implies. `freedom`: degrees of freedom of
+    the value, None for infinitely many.
+    """
     sensitivity = contribution * divisor / value if value > 0.0 else 0.0
     return BudgetRow(source, value, unit, distribution, divisor, sensitivity, contribution, freedom)
 

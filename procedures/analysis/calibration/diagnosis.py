@@ -70,7 +70,9 @@ class Movement:
 
 @dataclass(frozen=True)
 class TriadDiagnosis:
-    """Scored changes of a triad, the largest first, and what the residuals say as a whole; JSON-ready."""
+    """Scored changes of a triad, the largest first, and what the residuals say as a whole: their p-values, and
+    movements outside the triad that would explain them.
+    """
 
     triad: str
     changes: tuple[Change, ...]

@@ -48,7 +48,9 @@ class Misfit:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Warnings about a fit that is not perfect, whether it passes or not."""
+        """Warnings about residuals larger than the noise within the poses, or that cannot be checked; also where the
+        check passes.
+        """
         if self.ratio is None and self.spare > 0:
             return (
                 "nothing of the poses' noise is in the data and none is given: a bad fit cannot be told from noise; "

@@ -38,7 +38,9 @@ class Poses:
 
 
 def station_poses(recordings: Sequence[Recording], triad: str, unit: Unit | None) -> Poses:
-    """Return the poses of stations, one recording a pose. Raises `UnfitRecording`, `MissingChannel`."""
+    """Return the poses of stations, one recording a pose, with the noise of the unit's record; without one, that of the
+    scatter. Raises `UnfitRecording`, `MissingChannel`.
+    """
     means = station_means(recordings, triad)
     noise, known = noise_of_means(means, unit.triad(triad) if unit else None)
     slow = 0.0 if known else slow_share(means.slow_excess, noise)
@@ -49,8 +51,9 @@ def station_poses(recordings: Sequence[Recording], triad: str, unit: Unit | None
 def rows_as_poses(recording: Recording, samples: Array, triad: str, pose_sd: float | None, unit: Unit | None) -> Poses:
     """Poses from rows (n, 3) that are means already; a row lasts as long as its sample period.
 
-    The noise is what is given, else the unit's record over each row's time, else what the residuals show, for which
-    more poses are needed than the nine that the parameters take. Raises `BadParameter`.
+    The noise is `pose_sd`, the standard deviation of a row where it is given, else the unit's record over each row's
+    time, else what the residuals show, for which more poses are needed than the nine that the parameters take. Raises
+    `BadParameter`.
     """
     info, rows = recording.info, len(samples)
     output_unit = info.channels[info.column(TRIADS[triad][0])].rate_unit

@@ -115,7 +115,7 @@ class AtReference:
 
 @dataclass(frozen=True)
 class ThermalShare:
-    """Effect of the thermal correction on a calibration, JSON-ready."""
+    """Effect of the thermal correction on a calibration."""
 
     form: Form
     regime: str

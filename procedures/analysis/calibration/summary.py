@@ -62,7 +62,7 @@ class ScalarCheck:
 
 @dataclass(frozen=True)
 class TriadSummary:
-    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets. JSON-ready."""
+    """Complete calibration results of one triad: coefficients, residuals, tests, magnitudes, budgets."""
 
     calibration: TriadCalibration
     coefficients: tuple[Coefficient, ...]
@@ -101,8 +101,8 @@ def triad_summary(
     slow: float = 0.0,
     left_out: Magnitudes | None = None,
 ) -> TriadSummary:
-    """Return the numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not
-    known.
+    """Return the numbers of a fit, ready to be stored. `slow`: share of slow noise, where the noise is not known.
+    `scalar` and `left_out`: the cross-checks, None where they were not made.
     """
     misfit = residual_misfit(fit.residuals, fit.residual_sd, fit.chi_square, fit.degrees_of_freedom, labels, slow)
     return TriadSummary(

@@ -67,7 +67,8 @@ def table_errors(
     Columns: orthogonality outer-middle (about x between the two) and middle-inner (about y), level about x and z of the
     reference frame, azimuth about y, the magnitude of gravity, then pointing outer, middle, inner of station after
     station, and the latitude last where its uncertainty is declared. The order does not depend on the triad, so columns
-    of two triads at the same stations mean the same flaw.
+    of two triads at the same stations mean the same flaw. `of_gravity`: the vectors are specific forces, whose
+    magnitude is uncertain too.
     """
     n = len(angles)
     sensitivity = np.zeros((n, 3, 6 + 3 * n))

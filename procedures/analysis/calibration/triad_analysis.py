@@ -50,8 +50,10 @@ def analyse_triad(
     with_scalar: bool = False,
     weighting: Weighting = "noise_and_table",
 ) -> TriadSummary:
-    """Return the calibration of one triad from one recording a station. Raises `UnfitRecording`, `MissingChannel`,
-    `Undetermined`.
+    """Return the calibration of one triad from one recording a station.
+
+    `record`: the unit's noise; None: the scatter within the dwells stands in (`noise_of_means`). Raises
+    `UnfitRecording`, `MissingChannel`, `Undetermined`. `with_scalar`: also make the cross-check from magnitudes alone.
     """
     means = station_means(recordings, triad)
     return analyse_means(means, site, uncertainty, record, with_scalar, weighting)[0]
@@ -65,8 +67,10 @@ def analyse_gyros(
     weighting: Weighting = "noise_and_table",
     correction: GyroThermalCorrection | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
-    """Return the calibration of the gyros, by a correction for temperature first where there is one. Raises as
-    `analyse_triad`.
+    """Return the calibration of the gyros from one recording a station. Raises as `analyse_triad`.
+
+    `correction`: takes temperature out of the station means beforehand; None: they are taken as they are. `record` as
+    in `analyse_triad`.
     """
     means, more = station_means(recordings, "gyro"), dict[str, Array]()
     if correction is not None:
@@ -83,9 +87,10 @@ def analyse_means(
     weighting: Weighting = "noise_and_table",
     more: Mapping[str, Array] | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
-    """Calibrate one triad from its station means; `more`: covariances (3, n, n) from causes other than noise, by name.
+    """Calibrate one triad from its station means.
 
-    Raises `UnfitRecording`, `Undetermined`.
+    `more`: covariances (3, n, n) from causes other than noise, by name. `record` and `with_scalar` as in
+    `analyse_triad`. Raises `UnfitRecording`, `Undetermined`.
     """
     angles = station_angles(means)
     vectors = reference_vectors(means.triad, angles, site)
@@ -106,7 +111,8 @@ def analyse_inputs(
 ) -> tuple[TriadSummary, TriadFit]:
     """Calibrate one triad from its station means at known input vectors (n, 3) of one magnitude, `reference` [SI].
 
-    `table`: the flaws of what set them; `more` as in `analyse_means`. Raises `UnfitRecording`, `Undetermined`.
+    `table`: the flaws of what set them; `more`, `record` and `with_scalar` as in `analyse_means`. Raises
+    `UnfitRecording`, `Undetermined`.
     """
     noise, known = noise_of_means(means, record)
     noise = noise + sum((more or {}).values())
@@ -156,7 +162,7 @@ def analyse_accelerometers(
 ) -> tuple[TriadSummary, TriadFit, ThermalShare | None, tuple[str, ...]]:
     """Calibrate the accelerometers; with a correction also return its effect on them and warnings about its use.
 
-    Raises as `analyse_triad` and `bring_to_reference`.
+    `record` as in `analyse_triad`. Raises as `analyse_triad` and `bring_to_reference`.
     """
     means, correction = station_means(recordings, "accelerometer"), settings.correction
     how = settings.with_scalar, settings.weighting
@@ -170,9 +176,12 @@ def analyse_accelerometers(
 def brought_by_unit(
     recordings: Sequence[Recording], means: StationMeans, unit: Unit, lag_s: tuple[float, float]
 ) -> tuple[StationMeans, dict[str, Array], AtReference | None]:
-    """Station means at the references of the unit's corrections, and their covariances from these, by cause.
+    """Return station means at the reference temperatures of the unit's own correction, and what the correction adds to
+    their uncertainty.
 
-    Last what was made of the accelerometers; None of the gyros, and without a correction.
+    The second value has the covariances (3, n, n) by cause. The third has the details of the accelerometers'
+    correction; None for gyros. Without a correction of the triad the means are as they were, and there are no
+    covariances. `lag_s` as in `bring_to_reference`.
     """
     if means.triad == "accelerometer" and unit.thermal_correction is not None:
         brought = bring_to_reference(recordings, means, unit.thermal_correction, lag_s)

@@ -30,9 +30,7 @@ from procedures.core.unit import Unit
 
 @dataclass(frozen=True)
 class TriadVerification:
-    """Verification result of one triad: magnitudes, their test against the prediction, and the diagnosis.
-    JSON-ready.
-    """
+    """Verification result of one triad: magnitudes, their test against the prediction, and the diagnosis."""
 
     magnitudes: Magnitudes
     chi_square: float | None
@@ -94,8 +92,9 @@ def verify_gyros(
     uncertainty: TableUncertainty = TableUncertainty(),
     correction: GyroThermalCorrection | None = None,
 ) -> TriadVerification:
-    """Return the verification of the gyros, by a correction for temperature first where there is one. Raises as
-    `verify_triad`.
+    """Return the verification of the gyros by the unit's calibration. Raises as `verify_triad`.
+
+    `correction`: takes temperature out of the station means beforehand; None: they are taken as they are.
     """
     means, more = station_means(recordings, "gyro"), None
     if correction is not None:

@@ -17,7 +17,7 @@ from procedures.core.unit import TriadRecord
 
 @dataclass(frozen=True)
 class Magnitudes:
-    """|v̂| at n stations before and after correction, in SI; plain tuples, JSON-ready."""
+    """|v̂| at n stations before and after correction, with their means and spreads, in SI."""
 
     triad: str
     unit: str
@@ -51,7 +51,10 @@ def magnitudes(
     labels: Sequence[str],
     expected_sd: Array | None = None,
 ) -> Magnitudes:
-    """Return the statistics of |U| and |K⁻¹(U − b)| over outputs (n, 3) against a reference magnitude [SI]."""
+    """Return the statistics of |U| and |K⁻¹(U − b)| over outputs (n, 3) against a reference magnitude [SI].
+    `expected_sd` (n,): predicted standard deviation of each corrected magnitude, kept for the plots; None: not
+    predicted.
+    """
     after = np.linalg.norm(correct(outputs, calibration), axis=1)
     before = None if calibration.output_unit == "count" else np.linalg.norm(outputs, axis=1)
     sd_after = _sample_sd(after)
@@ -96,7 +99,8 @@ def error_covariance(
 
     Three parts: the calibration's own covariance; the noise of the verification's dwells, `noise_covariance` (3, n, n);
     and the change of bias and scale factor between two launches by the unit's record, each of which departs from the
-    unit's mean by the run-to-run standard deviation (hence twice the variance).
+    unit's mean by the run-to-run standard deviation (hence twice the variance). `record` None: the unit's changes are
+    not known, and left out.
     """
     matrix = calibration.matrix_array
     weights, of_coefficients = magnitude_sensitivity(vectors, matrix)

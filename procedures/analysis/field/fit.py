@@ -29,7 +29,9 @@ _SETTLED = 1e-12
 
 @dataclass(frozen=True)
 class FieldUncertainty:
-    """Standard deviations of what is taken as known [rad, relative]."""
+    """Standard deviations of the quantities that a field calibration does not estimate: set angles, tilt, azimuth,
+    magnitude, neglected cross-couplings.
+    """
 
     angle_sd_rad: float = 0.0
     """Setting error of each turn at each position, independent."""

@@ -24,7 +24,9 @@ GREATEST_VALUE, LEAST_SPREAD = 1e18, 1e-24
 
 
 def length(name: str, seen: int, announced: int | None, settings: FitnessSettings) -> list[Finding]:
-    """Return findings on too few samples, or another number than announced."""
+    """Return findings on a channel with too few samples, or with another number than `announced`; None: no number was
+    announced.
+    """
     found: list[Finding] = []
     if seen < settings.least_samples:
         told = f"channel {name}: {seen} samples are too few, at least {settings.least_samples} are needed"
@@ -146,8 +148,8 @@ def grows_evenly(channel: Channel, step: float, words: Wording) -> Finding:
 
 
 def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: int, words: Wording) -> list[Finding]:
-    """Return findings on samples that pile up at the largest or smallest value, or at the end of a converter's
-    range.
+    """Return findings on samples that pile up at the largest or smallest value, or at the end of a converter's range.
+    `is_integer`: the channel sends whole counts.
     """
     found: list[Finding] = []
     for edge, other in (edges, edges[::-1]):

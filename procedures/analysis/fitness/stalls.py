@@ -40,7 +40,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Around:
-    """Shares of samples that repeat outside a run."""
+    """Shares of samples that repeat the previous one, outside of a run."""
 
     parts: Array
     """Share of each channel, (channels,)."""

@@ -293,7 +293,9 @@ def _groups(channels: Sequence[Channel]) -> list[tuple[int, ...]]:
 
 
 def inspect(recording: Recording, settings: FitnessSettings | None = None) -> tuple[ChannelFitness, ...]:
-    """Return all findings of a recording, channel by channel, from one pass over it."""
+    """Return all findings of a recording, channel by channel, from one pass over it. `settings` None: the defaults of
+    `FitnessSettings`.
+    """
     info = recording.info
     stream = FitnessStream(info.channels, info.rate_hz, info.count, settings)
     for block in recording.blocks():

@@ -53,8 +53,8 @@ class Inspection:
         return replace(found, findings=tuple(wrong))
 
     def of_station(self, station: Station | None) -> FitnessSettings:
-        """Return the requirements on one recording: a station may turn on purpose, or feed a current in place of
-        gravity.
+        """Return the requirements on the recording of one station: rest is not required where the station turns, nor
+        gravity where it feeds a current. None: the requirements as they are.
         """
         if station is None:
             return self.settings

@@ -25,7 +25,9 @@ class Density:
 
 
 def density_of(slow: Powers, fast: Powers | None, confidence: float) -> Density:
-    """Return the density over all bins: of the cells beneath the lowest fast bin, of the segments from there on."""
+    """Return the density over all bins: of the cells beneath the lowest fast bin, of the segments from there on. `fast`
+    None: there are no segments.
+    """
     parts = [slow] if fast is None or not len(fast.frequency_hz) else [slow, fast]
     first = np.inf if len(parts) == 1 else float(parts[1].frequency_hz[0])
     kept = [slow.frequency_hz < first, *(np.ones(len(p.frequency_hz), dtype=np.bool_) for p in parts[1:])]

@@ -42,7 +42,7 @@ class FoundNoise:
 
     @property
     def correlated(self) -> CorrelatedProcess | None:
-        """The Gauss–Markov process of the fit, if any."""
+        """The Gauss–Markov process of the fit; None where the fit has none."""
         g = self.fit.gauss_markov
         return None if g is None else CorrelatedProcess(g.time_s, g.time_sd_s, g.driving, g.driving_sd, g.sd)
 
@@ -100,7 +100,7 @@ def found_noise(
     signal: CleanSignal, cells: Cells, powers: Powers | None, context: ChannelContext, settings: LaunchSettings
 ) -> FoundNoise:
     """Return the noise fitted to a channel's clean cells, with the likeliest temperature and shift of the level as
-    regressors.
+    regressors. `powers`: the spectrum of the samples at the full rate; None: the cells alone are fitted.
     """
     series, cell_s = signal.cells, cells.cell_s
     temperatures = {name: row[signal.first_cell :] for name, row in context.temperatures.items()}

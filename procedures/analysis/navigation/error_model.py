@@ -105,7 +105,9 @@ class Responses:
 
     @property
     def of_constant(self) -> Array:
-        """Errors at t per constant input since zero, shape (n + 1, 9, 6)."""
+        """Errors at each time of the grid per input that has been constant since zero, shape (n + 1, 9 states, 6
+        inputs).
+        """
         return np.concatenate([np.zeros((1, 9, 6)), np.cumsum(self.of_cell, axis=0)])
 
 

@@ -64,7 +64,12 @@ def greatest(growth: Growth) -> tuple[float, float]:
 
 
 def sentence(radius_m: float, own_m: float | None, uncalibrated_m: float | None, linear: bool) -> str:
-    """Return the benefit of the calibration in one sentence."""
+    """Return one sentence on the position's radius of 95 % after an hour, and on what the calibration contributes to
+    it.
+
+    `own_m`: the radius that the calibration's own uncertainty would leave, None without a calibration.
+    `uncalibrated_m`: that of nominal outputs; None: they could not navigate (`linear`), or it is not known.
+    """
     said = f"After one hour parked, the position is within {radius_m:.3g} m of the truth with 95 %"
     if own_m is None:
         return said + "."
@@ -75,7 +80,9 @@ def sentence(radius_m: float, own_m: float | None, uncalibrated_m: float | None,
 
 
 def warnings(gyro: TriadErrors, accelerometer: TriadErrors, has_launch: bool) -> tuple[str, ...]:
-    """Return warnings on contributions that are missing from the figures."""
+    """Return warnings on contributions that are missing from the figures. `has_launch`: the launch-to-launch stability
+    of the unit is known.
+    """
     found = [
         f"the noise of the {name} triad is not known and counts as none"
         for name, errors in (("gyro", gyro), ("accelerometer", accelerometer))

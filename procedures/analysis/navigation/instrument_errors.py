@@ -34,7 +34,8 @@ def calibrated_triad(calibration: TriadCalibration, record: TriadRecord | None, 
 
     The calibration's own covariance P of the twelve coefficients: ``δv̂ = −K⁻¹·(δb + δK·v)``. The unit's change since:
     it was calibrated in one launch and navigates in another, each of which departs from the unit's mean by the
-    run-to-run standard deviation, hence twice the variance; a scale factor carries its whole row of K.
+    run-to-run standard deviation, hence twice the variance; a scale factor carries its whole row of K. `record` None:
+    noise and changes of the unit are not known, and left out.
     """
     matrix = calibration.matrix_array
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)

@@ -49,7 +49,9 @@ class Agreement:
 
 
 def agreed(slow: Powers, fast: Powers | None) -> Agreement:
-    """Return the bins to fit and the model they need, with remarks on the excluded bins. Raises `UnfitRecording`."""
+    """Return the bins to fit and the model they need, with remarks on the excluded bins. Raises `UnfitRecording`.
+    `fast` None: the slow bins alone.
+    """
     ways = _ways(slow, fast)
     found, state = _first_that_fits(ways)
     base = ways[-1].joined.below(_SLOW_PART / slow.period_s) if found is None else found.joined
@@ -132,7 +134,9 @@ def _best(joined: Joined) -> State:
 
 
 def misfit(joined: Joined, best: State | None = None) -> float:
-    """Logarithm of the least p-value of the fitted octaves over that of the test's level; above 1 it does not fit."""
+    """Return the logarithm of the least p-value of the fitted octaves over that of the test's level: above 1 the model
+    does not fit. `best`: the state of greatest likelihood, found here where None.
+    """
     best = best or _best(joined)
     if best.log_likelihood == -np.inf:
         return inf

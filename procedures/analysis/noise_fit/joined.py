@@ -73,7 +73,9 @@ class Joined:
         return replace(self, spectrum=replace(s, columns=columns))
 
     def octaves(self, variances: Array, amplitudes: Array, ramp: bool) -> tuple[Octave, ...]:
-        """Return the goodness of fit of each octave, separately for slow and fast, and for fitted and excluded bins."""
+        """Return the goodness of fit of each octave, separately for slow and fast, and for fitted and excluded bins.
+        `ramp`: the model had a ramp.
+        """
         s = self.spectrum if ramp else self.spectrum.without_ramp
         z = deviates(s, variances, amplitudes)
         key = self.group * 2 + ~self.fitted
@@ -90,7 +92,8 @@ class Joined:
 def joined_at(slow: Powers, fast: Powers | None, crossover_hz: float) -> Joined:
     """Return slow bins below the crossover and fast ones above, as one spectrum.
 
-    Fast bins that do not follow the slow ones at once have a quantization of their own, in a fifth column.
+    Fast bins that do not follow the slow ones at once have a quantization of their own, in a fifth column. `fast` None:
+    the slow bins alone.
     """
     parts = [(slow, slow.frequency_hz < crossover_hz)]
     if fast is not None:

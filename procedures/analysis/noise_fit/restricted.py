@@ -112,7 +112,7 @@ def maximum(
     spectrum: Spectrum, free: Sequence[int], held: tuple[int, float] | None = None, start: Array | None = None
 ) -> State:
     """Return the state of greatest restricted likelihood over the `free` variances; one may be `held` at a value, the
-    others are 0.
+    others are 0. `start`: variances (p,) where the search begins; None: a guess from the spectrum.
     """
     free = [k for k in free if held is None or k != held[0]]
     fixed = np.zeros(spectrum.columns.shape[1])

@@ -62,10 +62,11 @@ def run_to_run_requirements(
 
 
 def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
-    """Warning where the plan is coarser than a limit: the expected value, and a sufficient dwell, if there is one.
+    """Warning where the plan is coarser than a limit: the expected value, and a sufficient dwell, if there is one. None
+    where the plan is fine enough or the noise is not known.
 
-    Only the scatter from one calibration to the next counts: noise, and the table's pointing; constant flaws of
-    the table do not. Only the noise falls with the dwell.
+    Only the scatter from one calibration to the next counts: noise, and the table's pointing; constant flaws of the
+    table do not. Only the noise falls with the dwell.
     """
 
     def uncertainty(dwell_s: float | None) -> float:
@@ -167,7 +168,9 @@ def sound_unit_fails(planned: PlannedCheck) -> float | None:
 
 
 def chance_of_failure(planned: PlannedCheck) -> str | None:
-    """Warning where a sound unit fails a planned check oftener than `RARE`, with the chance and what makes it."""
+    """Warning where a sound unit fails a planned check oftener than `RARE`, with the chance and what makes it. None
+    where it does not.
+    """
     chance = sound_unit_fails(planned)
     if chance is None or chance < RARE:
         return None

@@ -70,7 +70,9 @@ class LiveDwell:
         self._taken = 0
 
     def add(self, block: RawArray) -> int | None:
-        """Take the next samples (n, channels); return how many of them still belong to the dwell if it ends in them."""
+        """Take the next samples (n, channels). Return how many of them belong to the dwell where it ends in them, None
+        where it goes on.
+        """
         before = self._taken
         self._taken += len(block)
         rates = self._scale.rates(np.asarray(block)[:, self._columns].astype(np.float64))

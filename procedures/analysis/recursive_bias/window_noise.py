@@ -82,6 +82,7 @@ def observed_covariance(means: Array) -> Array:
 
     Variance and covariance of neighbours, nothing farther (a moving average of order one): white noise and
     quantization. Its correlation lies within ±1/2 by definition, and an estimate outside is clipped to that range.
+    Raises `UnfitRecording` for a constant channel.
     """
     centred = means - means.mean()
     variance = float(centred @ centred) / (len(means) - 1)
@@ -140,7 +141,9 @@ def slow_noise_p(means: Array, covariance: Array) -> float:
 
 
 def predicted_sd(noise: NoiseCoefficients, dwell_s: float, start_s: float, prior_variance: float | None) -> float:
-    """Return the standard uncertainty of a bias after a dwell, in a hundred windows of it."""
+    """Return the standard uncertainty of a bias after a dwell, in a hundred windows of it. `prior_variance` of the
+    bias, None: nothing is known before.
+    """
     edges = start_s + np.linspace(0.0, dwell_s, 101)
     covariance = contiguous_covariance(noise, np.column_stack([edges[:-1], edges[1:]]))
     return float(np.sqrt(RecursiveBias(covariance, 0.0, prior_variance).variances[-1]))
@@ -163,7 +166,7 @@ def known_noise(noise: NoiseCoefficients | None) -> NoiseCoefficients | None:
 
 
 def channel_names(recording: Recording, wanted: tuple[str, ...] | None, all_of: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the requested channels, else those of `all_of` that the recording has. Raises `MissingChannel`."""
+    """Return the `wanted` channels, or where None those of `all_of` that the recording has. Raises `MissingChannel`."""
     present = tuple(c.name for c in recording.info.channels)
     names = wanted or tuple(name for name in all_of if name in present)
     if not names:

@@ -13,7 +13,7 @@ from procedures.core.imu_model import TriadCalibration
 
 @dataclass(frozen=True)
 class Scatter:
-    """Sample standard deviation of one coefficient over n calibrations; plain numbers, JSON-ready."""
+    """Sample standard deviation of one coefficient over n calibrations."""
 
     triad: str
     name: str
@@ -44,7 +44,8 @@ def run_to_run(calibrations: Sequence[TriadCalibration]) -> tuple[Scatter, ...]:
     """Return the scatter of the three biases and the three scale factors of one triad over at least two calibrations.
 
     Bias in its own unit, scale factor K_ii relative to its mean (thesis 5.2, 5.3). A calibration of the scalar kind has
-    other axes than a linear one, so the two are not mixed.
+    other axes than a linear one, so the two are not mixed. Raises `BadParameter` for fewer than two, and for
+    calibrations of different triads, units or models.
     """
     if len(calibrations) < 2:
         raise BadParameter("calibrations", len(calibrations), "at least two of a triad are needed")

@@ -20,7 +20,7 @@ PAIRS = ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
 
 @dataclass(frozen=True)
 class CrossCoupling:
-    """Repeatability of one cross-coupling over n mountings; plain numbers in radians, JSON-ready."""
+    """Repeatability of one cross-coupling over n mountings, in radians."""
 
     triad: str
     name: str

@@ -102,7 +102,7 @@ def alignment_errors(found: Array, plan: Alignments) -> Array:
     return np.asarray(np.angle(np.exp(1j * (found - reference_attitudes(plan.angles, plan.site)))), dtype=np.float64)
 
 
-def told_alignments(
+def alignments_for_display(
     recordings: Sequence[Recording], plan: Alignments, found: Array, errors: Array, expected: ExpectedErrors
 ) -> tuple[Alignment, ...]:
     """Return the results in display units, alignment by alignment."""

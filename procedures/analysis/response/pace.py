@@ -40,7 +40,7 @@ def require_measured_pace(info: RecordingInfo) -> None:
         return
     label = info.id if info.station is None else info.station.label
     raise UnfitRecording(
-        f"station {label}: {pace.said} by {abs(pace.behind_s):.3g} s within the recording of "
+        f"station {label}: {pace.direction} by {abs(pace.behind_s):.3g} s within the recording of "
         f"{info.duration_s:.6g} s: {CAUSES}"
     )
 

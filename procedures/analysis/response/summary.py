@@ -141,7 +141,7 @@ def _swung(recording: Recording) -> tuple[str, list[float], float]:
 
 
 def table_axes_b(angles: TableAngles) -> Array:
-    """Return the directions of outer, middle and inner axis in the unit's axes, (3, 3); see
+    """Return the directions of outer, middle and inner axis in the unit's axes, a row each, (3, 3); see
     `core.frames.table_rotation`.
     """
     within_middle = table_rotation(TableAngles(0.0, 0.0, angles.inner_deg)).inv()

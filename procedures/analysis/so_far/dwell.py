@@ -50,8 +50,9 @@ class AllanSoFar:
 def bias_so_far(means: Array, cell_s: float, noise: NoiseCoefficients | None) -> BiasSoFar:
     """Run the Kalman filter of a constant bias over the means (n,) of successive cells of `cell_s`.
 
-    The noise's covariance is the unit's where its coefficients are known (`contiguous_covariance`), else the dwell's
-    own (`observed_covariance`). Raises `UnfitRecording` for fewer than `WINDOWS_MIN` cells and for a constant channel.
+    The noise's covariance is the unit's where its coefficients are known (`contiguous_covariance`), else, with `noise`
+    None, the dwell's own (`observed_covariance`). Raises `UnfitRecording` for fewer than `WINDOWS_MIN` cells and for a
+    constant channel.
     """
     windows, length_s = _windows(means, cell_s)
     known = known_noise(noise)

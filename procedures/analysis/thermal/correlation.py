@@ -48,7 +48,8 @@ def correlation(
     too seldom where the noise is white. Tried on 200 launches of 12 h with the noise of thesis table 4.1: alarms at a
     level of 0.01 in 0.010 with the ratio, in 0.010 with known noise.
 
-    Raises `UnfitRecording` where a series is too short, not finite or constant.
+    Raises `UnfitRecording` where a series is too short, not finite or constant; `BadParameter` for a noise without any
+    process.
     """
     if len(signal) != len(temperature_c) or not np.all(np.isfinite([signal, temperature_c])):
         raise UnfitRecording("a finite temperature is needed for every finite cell of the signal")

@@ -83,8 +83,10 @@ def own_noise(series: Sequence[Series], order: int, cell_s: float) -> NoiseCoeff
 
 
 def joint_p_value(series: Sequence[Series], cell_s: float, noise: NoiseCoefficients | None = None) -> float:
-    """Return the p-value of no dependence in all recordings together, by Fisher's ``−2·Σ ln p``. Raises
-    `UnfitRecording`.
+    """Return the p-value of the hypothesis that no recording depends on temperature, by Fisher's ``−2·Σ ln p``.
+
+    `series`: cell means of one channel, a recording each. `noise`: of the channel; None: the most likely one of each
+    recording (`correlation`). Raises `UnfitRecording`.
     """
     found = [correlation(s.values, s.departure_c, cell_s, noise).p_value for s in series]
     return float(chdtrc(2 * len(found), -2.0 * sum(log(max(p, SMALLEST_P)) for p in found)))
@@ -93,7 +95,9 @@ def joint_p_value(series: Sequence[Series], cell_s: float, noise: NoiseCoefficie
 def unseen_p_value(
     series: Sequence[Series], order: int, cell_s: float, noise: NoiseCoefficients | None = None
 ) -> float | None:
-    """Return the joint p-value of what a fit to all other recordings leaves in each; None with a single recording."""
+    """Return the joint p-value of what a fit to all other recordings leaves in each; None with a single recording.
+    `noise` as in `joint_p_value`.
+    """
     if len(series) < 2:
         return None
     left: list[Series] = []

@@ -102,7 +102,8 @@ def fit_axis(runs: Sequence[ThermalRun], axis: int, reference_c: tuple[float, fl
 
     The cells of each regime are weighted by the inverse spread of its own residuals: sensors that lag make the dynamic
     ones worse. The form ``both`` is fitted by generalised least squares with the residuals' noise (`correlated`); the
-    older forms, whose residuals are mostly what they cannot follow, by ordinary ones as in the thesis.
+    older forms, whose residuals are mostly what they cannot follow, by ordinary ones as in the thesis. Raises
+    `BadParameter` where the axis was never up or always, `UnfitRecording` where the fit does not converge.
     """
     up = [run.up == axis for run in runs]
     if not any(up) or all(up):

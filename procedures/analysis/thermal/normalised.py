@@ -21,7 +21,8 @@ def fit_normalised(temperature_c: Array, values: Array, reference_c: float, orde
     """Least squares of values (n,) at temperatures (n,) [°C] by a polynomial about the reference.
 
     Independent errors of equal size are assumed: one value a soak. The covariance of ratios ``a_k = c_k/c_0`` is that
-    of first order. Raises `BadParameter`, `UnfitRecording`, `Undetermined`.
+    of first order. Raises `BadParameter`, `UnfitRecording`, `Undetermined`. `relative`: the coefficients are ratios to
+    the value at the reference, as of a scale factor.
     """
     if order not in range(1, 7):
         raise BadParameter("order", order, "1 … 6")

@@ -239,7 +239,8 @@ class SensorWatch:
         """Readings of all sensors when each sensor's code last changed."""
 
     def step(self, codes: Sequence[int], readings_c: Sequence[float]) -> str | None:
-        """Check one reading; return a sentence if a sensor is disconnected, stuck or out of the unit's range.
+        """Check one reading; return a sentence where a sensor is disconnected, stuck or out of the unit's range, else
+        None.
 
         Codes and readings [°C] in the order of `SENSORS`.
         """

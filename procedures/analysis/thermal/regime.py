@@ -142,7 +142,8 @@ class RegimeTrace:
 def regimes(temperature_c: Array, sample_s: float, settings: RegimeSettings | None = None) -> RegimeTrace:
     """The regime of a record of the case temperature (n,) [°C]: the very steps of `RegimeIndicator`, one after another.
 
-    So post-processing and the live unit agree to the last bit. Raises `BadParameter`, `UnfitRecording`.
+    So post-processing and the live unit agree to the last bit. Raises `BadParameter`, `UnfitRecording`. `settings`
+    None: the defaults of `RegimeSettings`.
     """
     indicator = RegimeIndicator(sample_s, settings)
     samples = [indicator.step(t) for t in np.asarray(temperature_c, dtype=np.float64).tolist()]

@@ -30,7 +30,9 @@ from procedures.core.unit import TriadRecord
 
 
 def turn_parts(record: TriadRecord | None, windows: Array) -> list[Part]:
-    """Return the noise of the integrated outputs [rad] of recordings that last `windows` (n, 2), process by process."""
+    """Return the noise of the integrated outputs [rad] of recordings that last `windows` (n, 2), process by process.
+    None: no noise is known, and there are no parts.
+    """
     if record is None:
         return []
     seconds = windows[:, 1] - windows[:, 0]

@@ -96,7 +96,9 @@ def ferraris_estimator(motion: Turning, noise: Array | None, flaws: TableErrors,
 def analyse_ferraris(
     recordings: Sequence[Recording], site: Site, uncertainty: TableUncertainty, record: TriadRecord | None
 ) -> WholeTurns:
-    """Return the gyro triad from recordings of faces at rest and turning. Raises `UnfitRecording`, `Undetermined`."""
+    """Return the gyro triad from recordings of faces at rest and turning. Raises `UnfitRecording`, `Undetermined`.
+    `record`: the gyros' noise; None: the residuals stand in.
+    """
     means = station_means(recordings, "gyro")
     if means.output_unit != "rad/s":
         raise UnfitRecording(f"the gyro channels are in {means.output_unit}: whole turns need a nominal scale in rad")
@@ -140,7 +142,7 @@ def rest_means(recordings: Sequence[Recording]) -> StationMeans:
 
 
 def only(motion: Turning, which: Array) -> Turning:
-    """Return the motion of some of the stations, by a mask (n,)."""
+    """Return the motion of the stations that a mask (n,) selects."""
     angles = tuple(a for a, taken in zip(motion.angles, which, strict=True) if taken)
     fields = ("seconds", "axis_b", "angle_rad", "rate_rad_s", "earth_rad", "moments", "earth_rate_b")
     return replace(motion, **{name: getattr(motion, name)[which] for name in fields}, angles=angles)

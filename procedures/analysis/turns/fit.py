@@ -275,7 +275,8 @@ def fit_turns(
 ) -> TurnFit:
     """Fit integrated outputs (n, 3) [rad]; K and slopes for the weights come from plain least squares beforehand.
 
-    `flaws`: those of the table on this motion (`turn_flaws`).
+    `flaws`: those of the table on this motion (`turn_flaws`). `noise` as in `turn_estimator`; None: it is scaled to the
+    residuals.
     """
     slopes = outputs / motion.angle_rad[:, None]
     first = turn_estimator(motion, slopes, (), reference_rad_s, None, flaws, np.eye(3))

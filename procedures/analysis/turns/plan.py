@@ -144,7 +144,7 @@ def bench_time_s(plan: TurnPlan) -> tuple[float, tuple[float, ...]]:
 def too_coarse(plan: TurnPlan, made: TurnEstimator, limit_ppm: float) -> str | None:
     """Warning where 3σ of a scale factor passes its limit [ppm]: expected value, its noise part, a sufficient plan.
 
-    `made` is the plan's estimator.
+    `made` is the plan's estimator. None where it does not pass the limit.
     """
     expected = 3.0 * max(scale_factor_sd(made, plan.terms)) / units.PPM
     if expected <= limit_ppm:

@@ -32,7 +32,9 @@ class Answers:
 
     @property
     def permutation(self) -> Array | None:
-        """Signed permutation (3, 3) that the channels make of the axes; None where one has no axis of its own."""
+        """Signed permutation (3, 3), rows the channels and columns the unit's axes; None where a channel has no axis of
+        its own, or shares one.
+        """
         found = np.zeros((3, 3))
         for row, axis in enumerate(self.axes):
             if axis[1:] not in AXES:

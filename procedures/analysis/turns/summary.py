@@ -80,7 +80,8 @@ def analyse_turns(
     """Fit the gyro channels of recordings of whole turns.
 
     Raises `UnfitRecording` where a recording's station has no turn, where the channels are not in angle units, or where
-    a channel did not count the turns made; `MissingChannel`; `Undetermined`.
+    a channel did not count the turns made; `MissingChannel`; `Undetermined`. `record`: the gyros' noise; None: the
+    residuals stand in.
     """
     means = station_means(recordings, "gyro")
     if means.output_unit != "rad/s":
@@ -125,8 +126,8 @@ def whole_turns(
 def with_budgets(
     found: WholeTurns, fit: TurnFit, record: TriadRecord | None, windows: Array, flaws: TableErrors
 ) -> WholeTurns:
-    """Return the result with the budget of each coefficient; `windows` (n, 2) of the recordings, `flaws` of the
-    table.
+    """Return the result with the budget of each coefficient; `windows` (n, 2) of the recordings, `flaws` of the table.
+    `record` None: the noise is that of the residuals.
     """
     parts = turn_parts(record if found.noise_known else None, windows)
     return replace(found, budgets=turn_budgets(fit, [c.name for c in found.coefficients], parts, flaws))

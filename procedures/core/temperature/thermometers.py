@@ -26,7 +26,7 @@ class SensorCorrection:
 
 @dataclass(frozen=True)
 class ThermometerCorrection:
-    """Corrections of a unit's sensors. Raises `BadParameter` for numbers that are not finite or do not fit together."""
+    """Corrections of a unit's temperature sensors, with their common covariance."""
 
     sensors: tuple[SensorCorrection, ...]
     reference_c: float
@@ -36,6 +36,7 @@ class ThermometerCorrection:
     """Lowest and highest temperature of the soaks; beyond them the lines are extrapolated."""
 
     def __post_init__(self) -> None:
+        """Check the numbers. Raises `BadParameter` for one that is not finite, and for shapes that do not agree."""
         size = 2 * len(self.sensors)
         if not self.sensors or len({s.channel for s in self.sensors}) < len(self.sensors):
             raise BadParameter("sensors", [s.channel for s in self.sensors], "at least one, each channel once")

@@ -109,7 +109,9 @@ def lies(rows: int, width: int) -> bool:
 def tables_by_length(
     arrays: Sequence[NamedArray], notes: Sequence[str] = (), rates: StatedRates | None = None
 ) -> list[LogTable]:
-    """Return one table for each length that arrays have, the longest first; single numbers are no samples."""
+    """Return one table for each length that arrays have, the longest first; single numbers are no samples. `notes` and
+    `rates`: what the file states apart from its arrays.
+    """
     lengths: dict[int, list[NamedArray]] = {}
     for array in arrays:
         if array.rows > 1 and 1 <= array.width <= WIDEST:

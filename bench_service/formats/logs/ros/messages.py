@@ -142,7 +142,9 @@ class _Walk:
 
 
 def lay_out(types: Types, type_name: str, data: bytes, cdr: bool) -> Layout:
-    """Return the places of all numbers in a message of a type. Raises `Undecodable`."""
+    """Return the places of all numbers in a message of a type. Raises `Undecodable`. `cdr`: the encoding is that of ROS
+    2; False: that of ROS 1.
+    """
     walk = _Walk(types, data, cdr)
     walk.walk(type_name)
     walk.layout.size = walk.at

@@ -9,7 +9,7 @@ import numpy as np
 from procedures.analysis.thermal.correlation import correlation
 from procedures.analysis.thermal.cycle.doubts import doubts
 from procedures.analysis.thermal.cycle.fitted_range import extrapolated, range_of
-from procedures.analysis.thermal.cycle.forms import RunSoaks, normalised_triad, soak_table, soaks_of, worth
+from procedures.analysis.thermal.cycle.forms import RunSoaks, normalised_triad, performance_of, soak_table, soaks_of
 from procedures.analysis.thermal.cycle.gyro_correction import correct_gyros
 from procedures.analysis.thermal.cycle.gyros import found, gyro_noises, gyro_temperatures
 from procedures.analysis.thermal.cycle.hysteresis import hysteresis
@@ -195,7 +195,7 @@ def _forms(
     chosen = correction.axes[0].form
 
     def add(name: str, make: Corrects) -> None:
-        answers.append(worth(name, runs, soaked, make, gravity_m_s2))
+        answers.append(performance_of(name, runs, soaked, make, gravity_m_s2))
 
     for form in Form:
         try:
@@ -232,7 +232,7 @@ def _other_sensor(
     name, others = OTHER_SENSOR[settings.static], [replace(run, cells=run.other) for run in runs]
     try:
         made = fit_correction([run.cells for run in others], settings.reference_c, form)[0]
-        answers.append(worth(name, others, soaked, made, gravity_m_s2))
+        answers.append(performance_of(name, others, soaked, made, gravity_m_s2))
     except DomainError as refusal:
         refused.append(f"{name}: could not be fitted for comparison: {refusal}")
 

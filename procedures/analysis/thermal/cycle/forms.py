@@ -1,6 +1,6 @@
 """Performance of each correction form on a cycle, beside the polynomial of paper C (thesis table 4.5, 3.2.3).
 
-A correction is worth what it leaves: 3σ at each soak about the run's own reference soak, and |ĝ| over the whole run.
+A correction is judged by what it leaves: 3σ at each soak about the run's own reference soak, and |ĝ| over the run.
 """
 
 from collections.abc import Sequence
@@ -77,10 +77,10 @@ def _over_runs(figures: Sequence[ThreeSigma], name: str) -> tuple[float, float, 
     return x, y, z
 
 
-def worth(
+def performance_of(
     name: str, runs: Sequence[PreparedRun], found: Sequence[RunSoaks], correction: Corrects, gravity_m_s2: float
 ) -> FormFound:
-    """Return the performance of a correction on all runs: the worst 3σ, and |ĝ|."""
+    """Return the errors that a correction leaves over all runs: worst 3σ at a soak by axis, and rms of |ĝ| − g."""
     x, y, z = np.max([s.after_m_s2 for s in soak_table(runs, found, correction)], axis=0).tolist()
     g = [magnitude(run.cells, correction, gravity_m_s2) for run in runs]
     still, moving = (

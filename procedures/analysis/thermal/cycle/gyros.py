@@ -22,7 +22,9 @@ SMALLEST_P = 1e-300
 
 
 def in_cells(values: Array, sample_s: float, cell_s: float) -> Array:
-    """Return the means (n,) of whole cells of a series of one interval."""
+    """Return the means (n,) over cells of `cell_s` [s] of samples `sample_s` [s] apart; an incomplete last cell is left
+    out.
+    """
     size = round(cell_s / sample_s)
     count = len(values) // size
     return values[: count * size].reshape(count, size).mean(axis=1)
@@ -70,8 +72,9 @@ def gyro_temperatures(
 def gyro_noises(
     runs: Sequence[PreparedRun], settings: CycleSettings, known: Sequence[NoiseCoefficients] | None
 ) -> tuple[GyroNoise, ...]:
-    """Return Q, N, B of each gyro in each run by the likelihood of its second means' spectrum. Raises
-    `UnfitRecording`.
+    """Return Q, N and B of each gyro in each run, fitted to the spectrum of its means over a second.
+
+    `known`: noise of x, y, z from the unit's record, put next to them; None: not known. Raises `UnfitRecording`.
     """
     answers: list[GyroNoise] = []
     for axis, name in enumerate(AXES):

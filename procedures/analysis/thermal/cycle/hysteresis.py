@@ -23,7 +23,8 @@ from procedures.core.recording import AXES
 def hysteresis(
     runs: Sequence[PreparedRun], soaked: Sequence[RunSoaks], judged: Corrects, noises: Sequence[NoiseCoefficients]
 ) -> tuple[Hysteresis, ...]:
-    """Up less down of every axis at every target that a run reached both ways; `noises` are those of x, y, z.
+    """Return the hysteresis of every axis at every target that a run reached both ways: the level reached from below
+    less that from above; `noises` are those of x, y, z.
 
     A run's first leg has no way. Several legs up, or down, are taken together.
     """

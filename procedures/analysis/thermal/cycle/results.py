@@ -247,5 +247,5 @@ class ThermalCycle:
     """True if the unit's sensors were corrected by its current calibration of thermometers."""
     hysteresis: tuple[Hysteresis, ...] = ()
     gyro_correction: GyroThermalCorrection | None = None
-    """For gyros that depend on temperature; None where none does."""
+    """Correction of the gyros that depend on temperature; None where none does."""
     gyros_corrected: tuple[GyroCorrected, ...] = ()

@@ -87,8 +87,11 @@ class PreparedRun:
 def prepare(
     series: CycleSeries, settings: CycleSettings, gravity_m_s2: float, converter: ConverterTriad | None
 ) -> PreparedRun:
-    """Return a run ready to be fitted, with gravity along the axis that is up as its force. Raises `BadParameter`,
-    `UnfitRecording`.
+    """Return a run ready to be fitted: lags taken out, regimes found, and gravity along the axis that is up as its
+    force.
+
+    `converter`: the models that take the converter's temperature out of the outputs first; None: the outputs are taken
+    as they are. Raises `BadParameter`, `UnfitRecording`.
     """
     lags = settings.lag_s
     own = series.sensors_c[:, GYRO_SENSORS]

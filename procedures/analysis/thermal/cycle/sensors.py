@@ -23,7 +23,9 @@ CASE_LIKE_SD_S = 1.0
 
 
 def as_temperatures(series: CycleSeries, thermometers: ThermometerCorrection | None) -> CycleSeries:
-    """Return the series with its sensors corrected; those that were not calibrated as they read."""
+    """Return the series with its sensors corrected; those that were not calibrated as they read. `thermometers` None:
+    no sensor was calibrated.
+    """
     if thermometers is None:
         return series
     columns = [
@@ -83,7 +85,8 @@ def with_thermometers(correction: ThermalCorrection, thermometers: ThermometerCo
     """The correction as one of temperatures, its covariance with what offsets and slopes of the sensors leave open.
 
     A sensor whose temperatures are wrong by ``o + s·Δ`` turns ``c₁·Δ + c₂·Δ²`` into coefficients that are wrong by
-    ``s·c₁ + 2·o·c₂`` and ``2·s·c₂``. Used with the same sensors these errors cancel; beside another's they count.
+    ``s·c₁ + 2·o·c₂`` and ``2·s·c₂``. `thermometers` None: the correction as it is. Used with the same sensors these
+    errors cancel; beside another's they count.
     """
     if thermometers is None:
         return correction

@@ -72,7 +72,7 @@ class CycleSeries:
 
 
 def read_cycle(recording: Recording, up: int) -> CycleSeries:
-    """Second means of a run's channels; `up` is the axis that stood upwards.
+    """Return the means over each second of a run's channels; `up` is the index of the axis that stood upwards.
 
     Raises `MissingChannel`, `UnfitRecording` naming what is wrong: no profile, a profile that was not gone through, a
     sensor that is not there, channels in counts.

@@ -102,6 +102,8 @@ def allan_of(run: PreparedRun, judged: Corrects) -> tuple[AllanFound, ...]:
 
 
 def rise(lower: Sequence[float], upper: Sequence[float]) -> float:
-    """Largest ratio of a lower end to the least upper end at any shorter time; 0 of a single point."""
+    """Return the largest ratio of an interval's lower end to the least upper end at any shorter time: above 1 the curve
+    rises. 0 of a single point.
+    """
     least = np.minimum.accumulate(np.asarray(upper, dtype=np.float64))[:-1]
     return float(np.max(np.asarray(lower, dtype=np.float64)[1:] / least, initial=0.0))

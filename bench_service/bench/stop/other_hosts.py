@@ -19,7 +19,7 @@ from bench_service.bench.stop.messages import (
     send_line,
     split_address,
 )
-from bench_service.bench.stop.road import Sent
+from bench_service.bench.stop.routes import Sent
 from bench_service.bench.stop.word import StopWord
 from bench_service.model.errors import ServiceError
 from bench_service.wall_clock import monotonic_s
@@ -33,9 +33,9 @@ LEARN_S = 2.0
 log = logging.getLogger(__name__)
 
 
-class ListenerRoad:
+class ListenerRoute:
     """The route of a stop to a bench of another host, over TCP to the listener of its supervisor. Implements
-    `StopRoad`.
+    `StopRoute`.
     """
 
     here = False
@@ -95,10 +95,10 @@ class StopAddresses:
         self._ending.set()
         self._thread.join(LEARN_S)
 
-    def road(self, bench_id: str) -> ListenerRoad | None:
+    def route(self, bench_id: str) -> ListenerRoute | None:
         """Return the route to a bench of another host; None where its address or the secret is not known here."""
         at, secret = self._known.get(bench_id), read_secret(self._secret_file)
-        return None if at is None or secret is None else ListenerRoad(bench_id, at, secret)
+        return None if at is None or secret is None else ListenerRoute(bench_id, at, secret)
 
     def host(self, bench_id: str) -> str:
         """Return the name of a bench's host; empty where it is not known."""

@@ -33,7 +33,7 @@ class Sent:
     """Safety of the bench after the stop; None: this route does not report it."""
 
 
-class StopRoad(Protocol):
+class StopRoute(Protocol):
     """A route of a stop to one bench. Interface: over the channel of this host, or over TCP to another one."""
 
     @property
@@ -46,16 +46,16 @@ class StopRoad(Protocol):
         ...
 
 
-class ChannelRoad:
+class ChannelRoute:
     """The route of a stop over the channel in this host's device folder, and over the supervisor's listener where the
-    channel fails. Implements `StopRoad`.
+    channel fails. Implements `StopRoute`.
 
     The channel takes nothing where its file belongs to another user, or no descriptor is left.
     """
 
     here = True
 
-    def __init__(self, channel: StopChannel, otherwise: Callable[[str], StopRoad | None]) -> None:
+    def __init__(self, channel: StopChannel, otherwise: Callable[[str], StopRoute | None]) -> None:
         self._channel = channel
         self._otherwise = otherwise
 
@@ -67,7 +67,7 @@ class ChannelRoad:
         return Sent(False) if other is None else other.ask(word)
 
 
-class StopRoads:
+class StopRoutes:
     """The routes of a stop to every bench that can be stopped from this process, with the channels of this host kept
     open.
     """
@@ -75,7 +75,7 @@ class StopRoads:
     def __init__(
         self,
         folder: Path | None,
-        elsewhere: Callable[[str], StopRoad | None] = lambda _: None,
+        elsewhere: Callable[[str], StopRoute | None] = lambda _: None,
         where: Callable[[str], str] = lambda _: "",
     ) -> None:
         """Set up with `folder`, the place of this host's stop channels, and `elsewhere`, which returns the route
@@ -104,10 +104,10 @@ class StopRoads:
                 self._channels[bench_id] = found
             return found
 
-    def to(self, bench_id: str) -> StopRoad | None:
+    def to(self, bench_id: str) -> StopRoute | None:
         """Return the route to a bench; None where the database is the only one."""
         channel = self.channel(bench_id)
-        return self._elsewhere(bench_id) if channel is None else ChannelRoad(channel, self._elsewhere)
+        return self._elsewhere(bench_id) if channel is None else ChannelRoute(channel, self._elsewhere)
 
     def wake(self, bench_id: str) -> None:
         """Wake the bench's worker, if it is on this host, so that it looks into its queue."""
