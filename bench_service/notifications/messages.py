@@ -77,6 +77,16 @@ def of_disk(bench: str, free: int, at: datetime) -> Message:
     return Message(f"disk-{at.date().isoformat()}", "disk", f"{bench}: the disk is nearly full", text, bench, at, "/")
 
 
+def of_silent_supervisor(bench: str, supervisor: str, at: datetime) -> Message:
+    """Make the message about a supervisor that lives and gives no heartbeat; its key has the process."""
+    text = (
+        f"The supervisor, {supervisor}, gives no heartbeat: it hangs or is suspended, and nobody watches over the "
+        "bench. The process that drives the bench ends it and starts another one."
+    )
+    key = f"supervisor-{supervisor.replace(' ', '-')}"
+    return Message(key, "trouble", f"{bench}: its supervisor is silent", text, bench, at, f"/#bench-{bench}")
+
+
 def digest(messages: list[Message], bench: str, at: datetime) -> Message:
     """Make one message from those above the hourly limit, with the title and time of each."""
     lines = [f"{one.at.isoformat(timespec='seconds')}  {one.title}" for one in messages]

@@ -111,6 +111,9 @@ class SafetyView(BaseModel):
     supervisor: str | None = Field(
         description="The process of this host that makes the bench safe if the worker cannot"
     )
+    silent_supervisor: str | None = Field(
+        description="A supervisor of this host without a heartbeat, which hangs or is suspended: nobody watches"
+    )
 
     @classmethod
     def of(cls, safety: Safety) -> "SafetyView":
@@ -121,6 +124,7 @@ class SafetyView(BaseModel):
             devices=DevicesView.of(safety.devices),
             worker=None if safety.worker is None else str(safety.worker),
             supervisor=None if safety.supervisor is None else str(safety.supervisor),
+            silent_supervisor=None if safety.silent_supervisor is None else str(safety.silent_supervisor),
         )
 
 
