@@ -24,6 +24,7 @@ from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal
 from bench_service.jobs.numbers import job_id_of
 from bench_service.mapping import copied
+from bench_service.model.job import JobHeading
 from bench_service.model.raw_data import RawState
 from bench_service.model.records import RecordingState, StoredRecording
 from bench_service.routing import Routes
@@ -41,6 +42,8 @@ class RecordingView(BaseModel):
     id: str
     unit: str
     job: str | None
+    job_number: int | None = Field(None, description="Short number of that job; only in lists, and for one recording")
+    procedure: str | None = Field(None, description="Procedure of that job; only in lists, and for one recording")
     bench: str | None
     station: Station | None
     state: RecordingState
@@ -68,9 +71,22 @@ class RecordingView(BaseModel):
     results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
 
     @classmethod
-    def of(cls, stored: StoredRecording, results: tuple[str, ...] | None = None) -> "RecordingView":
+    def of(
+        cls, stored: StoredRecording, results: tuple[str, ...] | None = None, heading: JobHeading | None = None
+    ) -> "RecordingView":
+        """Convert a recording to its HTTP view; `heading`: number and procedure of its job."""
         warnings = [str(warning) for warning in stored.source.get("warnings", ())]
-        return copied(cls, stored, stored.info, job=stored.job_id, warnings=warnings, results=results)
+        number, procedure = (None, None) if heading is None else (heading.number, heading.procedure)
+        return copied(
+            cls,
+            stored,
+            stored.info,
+            job=stored.job_id,
+            job_number=number,
+            procedure=procedure,
+            warnings=warnings,
+            results=results,
+        )
 
 
 class RecordingPage(BaseModel):
@@ -110,14 +126,19 @@ def list_recordings(
     page = service.stores.recordings.list(
         job_id=job_id, unit=unit, simulated=simulated, search=search, after=after, limit=limit
     )
-    return RecordingPage(items=[RecordingView.of(r) for r in page.items], next=page.next)
+    headings = service.stores.jobs.headings(sorted({r.job_id for r in page.items if r.job_id is not None}))
+    items = [RecordingView.of(r, heading=headings.get(r.job_id or "")) for r in page.items]
+    return RecordingPage(items=items, next=page.next)
 
 
 @router.get("/{recording_id}", responses=problems(404))
 def read_recording(recording_id: str, service: Service) -> RecordingView:
     """Read one recording with its channels, its hash and the results that used it."""
     stored = service.stores.recordings.get(recording_id)
-    return RecordingView.of(stored, service.stores.results.of_recording(recording_id))
+    headings = service.stores.jobs.headings([] if stored.job_id is None else [stored.job_id])
+    return RecordingView.of(
+        stored, service.stores.results.of_recording(recording_id), headings.get(stored.job_id or "")
+    )
 
 
 @router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404, 409, 410), **DATA})
