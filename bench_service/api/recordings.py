@@ -1,7 +1,6 @@
 """Routes of recordings: list them, export samples, and import a recorded file."""
 
-from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated
 
 from anyio import CapacityLimiter, to_thread
 from fastapi import File, Form, Query, Request, Response, UploadFile
@@ -14,6 +13,7 @@ from bench_service.api.http.bodies import refuse_unfit
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.queries import Searched
+from bench_service.api.recording_views import RecordingPage, RecordingView
 from bench_service.evidence.admission import Places
 from bench_service.evidence.recordings import require_undamaged
 from bench_service.formats.description import ImportDescription
@@ -23,77 +23,12 @@ from bench_service.formats.overview import overview
 from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal
 from bench_service.jobs.numbers import job_id_of
-from bench_service.mapping import copied
-from bench_service.model.job import JobHeading
-from bench_service.model.raw_data import RawState
-from bench_service.model.records import RecordingState, StoredRecording
+from bench_service.model.records import StoredRecording
 from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
-from procedures.core.measured import Measured
-from procedures.core.recording import Channel, Station
 
 router = Routes(prefix="/api/v1/recordings", tags=["recordings"])
-
-
-class RecordingView(BaseModel):
-    """A recording without its samples."""
-
-    id: str
-    unit: str
-    job: str | None
-    job_number: int | None = Field(None, description="Short number of that job; only in lists, and for one recording")
-    procedure: str | None = Field(None, description="Procedure of that job; only in lists, and for one recording")
-    bench: str | None
-    station: Station | None
-    state: RecordingState
-    channels: list[Channel]
-    rate_hz: float
-    count: int
-    duration_s: float
-    start_s: float
-    launched_s: float | None = Field(description="Bench time at which the unit was switched on; null: not known")
-    measured: Measured | None = Field(
-        description="Means of encoders and supply during the recording; null: they were not read"
-    )
-    content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
-    simulated: bool
-    stored_bytes: int
-    chunks: int
-    created_at: datetime
-    raw: RawState = Field(description="Where the raw samples are; `removed`: reading them answers 410")
-    raw_changed_at: datetime | None = Field(description="When the samples were moved there; null: never moved")
-    source: dict[str, Any] = Field(
-        description="Import: files, description, and `clock`, what its stamps say. Bench with a bench file: "
-        "`origin` (real, mixed or simulated) and `devices`, with identities and certificates"
-    )
-    warnings: list[str] = Field(description="Findings of the import that a person should know")
-    results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
-
-    @classmethod
-    def of(
-        cls, stored: StoredRecording, results: tuple[str, ...] | None = None, heading: JobHeading | None = None
-    ) -> "RecordingView":
-        """Convert a recording to its HTTP view; `heading`: number and procedure of its job."""
-        warnings = [str(warning) for warning in stored.source.get("warnings", ())]
-        number, procedure = (None, None) if heading is None else (heading.number, heading.procedure)
-        return copied(
-            cls,
-            stored,
-            stored.info,
-            job=stored.job_id,
-            job_number=number,
-            procedure=procedure,
-            warnings=warnings,
-            results=results,
-        )
-
-
-class RecordingPage(BaseModel):
-    """One page of recordings, newest first."""
-
-    items: list[RecordingView]
-    next: str | None
 
 
 EXPORTS = Places("exports", most=8, most_bytes=100_000_000)

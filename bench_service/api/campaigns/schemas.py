@@ -144,7 +144,7 @@ class ScheduleView(BaseModel):
     """A schedule: the times at which a campaign starts by itself."""
 
     id: str
-    cron: str | None = Field(description="null for a single start")
+    cron: str | None = Field(description="Minute, hour, day of month, month, day of week; null for a single start")
     time_zone: str | None
     at: datetime | None = Field(description="The only start, UTC; null for repeated ones")
     campaign: str
