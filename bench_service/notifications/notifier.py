@@ -13,13 +13,23 @@ from threading import Thread
 from bench_service.bench.processes import Watch
 from bench_service.campaigns.stores import Stores
 from bench_service.model.errors import ServiceError
-from bench_service.notifications.messages import Message, of_disk, of_event, of_run, of_silent_supervisor, of_stop
+from bench_service.notifications.messages import (
+    Message,
+    of_certificate,
+    of_disk,
+    of_event,
+    of_run,
+    of_silent_supervisor,
+    of_stop,
+)
 from bench_service.notifications.outbox import Outbox
 from bench_service.wall_clock import monotonic_s, now
 
 LOOK_S = 1.0
 """Interval between two looks at stops and campaign runs, and longest time until a message is tried [s]."""
 DISK_S = 60.0
+DUE_SOON_DAYS = 30
+"""Time before its end from which a certificate of a device is reported [d]."""
 RUNS = 20
 """Number of latest campaign runs that are looked at."""
 
@@ -103,6 +113,13 @@ class Notifier:
             free = self._free_bytes()
             if free is not None and free < self._least_free_bytes:
                 self._tell(of_disk(self._bench, free, now()))
+            self._look_at_certificates()
+
+    def _look_at_certificates(self) -> None:
+        """Report certificates of the bench's devices that have expired, and those that expire within a month."""
+        description, today = self._stores.benches.bench(self._bench), now().date().isoformat()
+        for sentence in (*description.overdue(today), *description.due_within(DUE_SOON_DAYS, today)):
+            self._tell(of_certificate(self._bench, sentence, now()))
 
     def _jobs_news(self, job_id: str) -> None:
         job = self._stores.jobs.get(job_id)

@@ -16,6 +16,8 @@ from bench_service.pages.images import SHELF
 from bench_service.pages.rendering import service_of, templates
 from bench_service.routing import Routes
 from bench_service.service import BenchService
+from bench_service.wall_clock import now
+from procedures.bench.description import BenchDescription
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
 from procedures.core.report import Figure
@@ -124,6 +126,12 @@ def _notes(events: tuple[Event, ...]) -> list[dict[str, Any]]:
     return notes
 
 
+def _certificates(bench: BenchDescription) -> list[str]:
+    """Sentences on certificates of the bench's devices that have expired, or expire within a month."""
+    today = now().date().isoformat()
+    return [f"{each[0].upper()}{each[1:]}." for each in (*bench.overdue(today), *bench.due_within(30, today))]
+
+
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
     """Return the HTML page of the benches, their units and the latest jobs."""
@@ -142,6 +150,7 @@ def home(request: Request) -> HTMLResponse:
                 "stops": service.stores.benches.standing_stops(bench_id),
                 "driven": service.benches.driven(bench_id),
                 "queued": queued.get(bench_id, 0),
+                "certificates": _certificates(service.benches.description(bench_id)),
             }
             for bench_id in service.benches.ids()
         ],

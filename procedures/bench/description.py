@@ -96,6 +96,16 @@ class BenchDescription:
             if (c := d.certificate) is not None and c.overdue(today)
         )
 
+    def due_within(self, days: int, today: str) -> tuple[str, ...]:
+        """Return a sentence for each certificate that expires within some days of a day (ISO 8601), that day among
+        them.
+        """
+        return tuple(
+            f"the certificate {c.number} of the {d.name} expires soon: it is valid until {c.due}"
+            for d in self.devices
+            if (c := d.certificate) is not None and 0 <= c.days_left(today) <= days
+        )
+
     @property
     def axis_motion(self) -> tuple[tuple[float, float], ...]:
         """(rate_deg_s, acceleration_deg_s2) of outer, middle and inner axis."""

@@ -143,6 +143,10 @@ def test_a_certificate_is_overdue_after_its_day(tmp_path: Path, day: str, overdu
     assert found.overdue(day) == (
         ("the certificate AT-117 of the turntable has expired: it was valid until 2027-03-02",) if overdue else ()
     )
+    soon = "the certificate AT-117 of the turntable expires soon: it is valid until 2027-03-02"
+    assert found.due_within(30, day) == (() if overdue else (soon,))
+    assert found.due_within(30, "2027-01-30") == ()
+    assert found.due_within(31, "2027-01-30") == (soon,)
 
 
 def test_a_time_factor_belongs_to_served_simulators_alone(tmp_path: Path) -> None:

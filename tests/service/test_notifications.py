@@ -23,6 +23,7 @@ from bench_service.notifications.targets import Mail, Webhook, read_targets
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
+from procedures.bench import BenchDescription
 from tests.kit.supervised_bench import GONE
 from tests.service.client import FAST, Client
 
@@ -291,6 +292,8 @@ def test_a_bench_tells_of_verdicts_prompts_failed_nights_stops_and_a_silent_supe
     tmp_path: Path, hook: _Hook, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(HostFiles, "silent_supervisor", lambda _: GONE.process)
+    due = "the certificate AT-1 of the turntable expires soon: it is valid until 2031-01-02"
+    monkeypatch.setattr(BenchDescription, "due_within", lambda *_: (due,))
     file = tmp_path / "notify.toml"
     file.write_text(f'[[target]]\nname = "chat"\nkind = "webhook"\nurl = "{hook.url}"\n')
     url = f"sqlite:///{tmp_path / 'bench.sqlite'}"
@@ -302,6 +305,7 @@ def test_a_bench_tells_of_verdicts_prompts_failed_nights_stops_and_a_silent_supe
         until(lambda: "prompt" in kinds(hook))
         silent = [got["text"] for got in hook.got if got["title"] == "sim: its supervisor is silent"]
         assert len(silent) == 1
+        assert f'<p class="warning">T{due[1:]}.</p>' in http.get("/").text
         assert silent[0].startswith("The supervisor, process 1 on nowhere, gives no heartbeat")
         http.post(f"/api/v1/jobs/{asks['id']}/cancel")
         client.wait(asks["id"])
@@ -320,4 +324,5 @@ def test_a_bench_tells_of_verdicts_prompts_failed_nights_stops_and_a_silent_supe
     assert "limit" in told["campaign"]["text"] or "=" in told["campaign"]["text"]
     assert told["stop"]["key"] == f"stop-{stop}"
     assert "Olena: smoke" in told["stop"]["text"]
-    assert sorted(kinds(hook)) == ["campaign", "prompt", "stop", "trouble", "verdict", "verdict"]
+    assert sorted(kinds(hook)) == ["campaign", "certificate", "prompt", "stop", "trouble", "verdict", "verdict"]
+    assert told["certificate"]["title"] == f"sim: {due}"
