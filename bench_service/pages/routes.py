@@ -28,6 +28,8 @@ router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 SHOWN_EVENTS = 300
 """Number of a job's latest events that its page lists."""
+SHOWN_UNITS = 20
+"""Number of units that the first page lists, those that a bench has before the others."""
 SHOWN_SOURCES = 20
 """Number of an analysis's recordings that its page lists by name."""
 _VERBS = {
@@ -137,8 +139,9 @@ def home(request: Request) -> HTMLResponse:
     """Return the HTML page of the benches, their units and the latest jobs."""
     service = service_of(request)
     queued = service.stores.queue.lengths()
-    units = service.stores.units.units()
-    testable = service.benches.testable(unit.serial for unit in units)
+    serials = service.stores.units.serials()
+    testable = service.benches.testable(serials)
+    first = sorted(serials, key=lambda serial: serial not in testable)[:SHOWN_UNITS]
     return _page(
         request,
         "home.html",
@@ -155,7 +158,8 @@ def home(request: Request) -> HTMLResponse:
             for bench_id in service.benches.ids()
         ],
         jobs=service.stores.jobs.list(limit=20).items,
-        units=sorted(units, key=lambda unit: unit.serial not in testable),
+        units=sorted(service.stores.units.units(first), key=lambda unit: unit.serial not in testable),
+        unit_count=len(serials),
         testable=testable,
     )
 
