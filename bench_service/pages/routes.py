@@ -8,6 +8,7 @@ from fastapi.responses import HTMLResponse
 
 from bench_service.formats.calibration_exports.forms import CalibrationForm
 from bench_service.jobs.numbers import job_id_of
+from bench_service.jobs.reservation import reservation_of_bench
 from bench_service.model.errors import NotFound
 from bench_service.model.job import FINAL, Event, Job, JobState
 from bench_service.model.records import StoredResult
@@ -153,6 +154,7 @@ def home(request: Request) -> HTMLResponse:
                 "stops": service.stores.benches.standing_stops(bench_id),
                 "driven": service.benches.driven(bench_id),
                 "queued": queued.get(bench_id, 0),
+                "reserved": reservation_of_bench(service.stores.reservations, bench_id, now()),
                 "certificates": _certificates(service.benches.description(bench_id)),
             }
             for bench_id in service.benches.ids()

@@ -128,6 +128,14 @@ class SafetyView(BaseModel):
         )
 
 
+class ReservedView(BaseModel):
+    """The reservation that a bench is under: who has it, and until when."""
+
+    holder: str
+    until: datetime
+    note: str
+
+
 class BenchView(BaseModel):
     """A bench: its declared description and its current activity."""
 
@@ -144,6 +152,7 @@ class BenchView(BaseModel):
     safety: SafetyView
     driven_by: str | None = Field(description="Worker process that drives it now; null: none, its jobs wait")
     queued: int = Field(description="How many jobs wait in its queue")
+    reserved: ReservedView | None = Field(description="Its reservation now; null: anybody's jobs may start")
 
 
 class QueueEntryView(BaseModel):
