@@ -10,6 +10,7 @@ from collections.abc import Callable
 from threading import Event as Flag
 from threading import Thread
 
+from bench_service.bench.directory import certificates_due
 from bench_service.bench.processes import Watch
 from bench_service.campaigns.stores import Stores
 from bench_service.model.errors import ServiceError
@@ -28,8 +29,6 @@ from bench_service.wall_clock import monotonic_s, now
 LOOK_S = 1.0
 """Interval between two looks at stops and campaign runs, and longest time until a message is tried [s]."""
 DISK_S = 60.0
-DUE_SOON_DAYS = 30
-"""Time before its end from which a certificate of a device is reported [d]."""
 RUNS = 20
 """Number of latest campaign runs that are looked at."""
 
@@ -117,8 +116,7 @@ class Notifier:
 
     def _look_at_certificates(self) -> None:
         """Report certificates of the bench's devices that have expired, and those that expire within a month."""
-        description, today = self._stores.benches.bench(self._bench), now().date().isoformat()
-        for sentence in (*description.overdue(today), *description.due_within(DUE_SOON_DAYS, today)):
+        for sentence in certificates_due(self._stores.benches.bench(self._bench), now()):
             self._tell(of_certificate(self._bench, sentence, now()))
 
     def _jobs_news(self, job_id: str) -> None:

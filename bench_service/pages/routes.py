@@ -6,6 +6,7 @@ from typing import Any
 from fastapi import Request
 from fastapi.responses import HTMLResponse
 
+from bench_service.bench.directory import certificates_due
 from bench_service.formats.calibration_exports.forms import CalibrationForm
 from bench_service.jobs.numbers import job_id_of
 from bench_service.jobs.reservation import reservation_of_bench
@@ -18,7 +19,6 @@ from bench_service.pages.rendering import service_of, templates
 from bench_service.routing import Routes
 from bench_service.service import BenchService
 from bench_service.wall_clock import now
-from procedures.bench.description import BenchDescription
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
 from procedures.core.report import Figure
@@ -129,12 +129,6 @@ def _notes(events: tuple[Event, ...]) -> list[dict[str, Any]]:
     return notes
 
 
-def _certificates(bench: BenchDescription) -> list[str]:
-    """Sentences on certificates of the bench's devices that have expired, or expire within a month."""
-    today = now().date().isoformat()
-    return [f"{each[0].upper()}{each[1:]}." for each in (*bench.overdue(today), *bench.due_within(30, today))]
-
-
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
     """Return the HTML page of the benches, their units and the latest jobs."""
@@ -155,7 +149,7 @@ def home(request: Request) -> HTMLResponse:
                 "driven": service.benches.driven(bench_id),
                 "queued": queued.get(bench_id, 0),
                 "reserved": reservation_of_bench(service.stores.reservations, bench_id, now()),
-                "certificates": _certificates(service.benches.description(bench_id)),
+                "certificates": certificates_due(service.benches.description(bench_id), now()),
             }
             for bench_id in service.benches.ids()
         ],

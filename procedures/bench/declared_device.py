@@ -1,7 +1,6 @@
 """Declaration of the devices of a bench: real or simulated, identity, and calibration certificate."""
 
 from dataclasses import dataclass
-from datetime import date
 
 from procedures.bench.device import DeviceIdentity
 
@@ -18,10 +17,6 @@ class DeclaredCertificate:
     def overdue(self, today: str) -> bool:
         """Return whether the certificate has expired on a day, ISO 8601."""
         return today > self.due
-
-    def days_left(self, today: str) -> int:
-        """Return the number of days until it expires; negative once it has expired."""
-        return (date.fromisoformat(self.due) - date.fromisoformat(today)).days
 
 
 @dataclass(frozen=True)

@@ -96,14 +96,12 @@ class BenchDescription:
             if (c := d.certificate) is not None and c.overdue(today)
         )
 
-    def due_within(self, days: int, today: str) -> tuple[str, ...]:
-        """Return a sentence for each certificate that expires within some days of a day (ISO 8601), that day among
-        them.
-        """
+    def due_between(self, today: str, last: str) -> tuple[str, ...]:
+        """Return a sentence for each certificate whose last day is one of `today` … `last` (ISO 8601)."""
         return tuple(
             f"the certificate {c.number} of the {d.name} expires soon: it is valid until {c.due}"
             for d in self.devices
-            if (c := d.certificate) is not None and 0 <= c.days_left(today) <= days
+            if (c := d.certificate) is not None and today <= c.due <= last
         )
 
     @property

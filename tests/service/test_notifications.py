@@ -293,7 +293,7 @@ def test_a_bench_tells_of_verdicts_prompts_failed_nights_stops_and_a_silent_supe
 ) -> None:
     monkeypatch.setattr(HostFiles, "silent_supervisor", lambda _: GONE.process)
     due = "the certificate AT-1 of the turntable expires soon: it is valid until 2031-01-02"
-    monkeypatch.setattr(BenchDescription, "due_within", lambda *_: (due,))
+    monkeypatch.setattr(BenchDescription, "due_between", lambda *_: (due,))
     file = tmp_path / "notify.toml"
     file.write_text(f'[[target]]\nname = "chat"\nkind = "webhook"\nurl = "{hook.url}"\n')
     url = f"sqlite:///{tmp_path / 'bench.sqlite'}"
