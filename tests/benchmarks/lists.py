@@ -123,7 +123,7 @@ def addresses(client: httpx.Client, real: str, begin_ms: int, jobs: int) -> dict
 
 
 def _asked_by_pages() -> dict[str, str]:
-    """What the pages ask the API for beside their lists."""
+    """Addresses of the API that the pages use in addition to their lists."""
     return {
         "jobs page: the catalogue": "/api/v1/procedures",
         "jobs page: 50 found": "/api/v1/jobs?limit=50",
