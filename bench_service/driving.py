@@ -61,7 +61,7 @@ def driving(
     guard.begin()
     closing.callback(guard.end)
     closing.callback(files.keep_books(stores).end)
-    begin_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES, closing)
+    begin_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES, files.host, closing)
     return worker, board
 
 

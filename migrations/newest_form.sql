@@ -1,4 +1,4 @@
--- revision 0022
+-- revision 0023
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -643,5 +643,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0022');
+INSERT INTO "alembic_version" VALUES ('0023');
 

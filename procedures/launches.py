@@ -19,7 +19,7 @@ from procedures.analysis.launch.surroundings import vibration, with_origins
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import verdict
 from procedures.core.noise import NoiseCoefficients
-from procedures.core.recording import TRIADS, Recording
+from procedures.core.recording import TRIADS, Recording, titles
 from procedures.core.unit import Unit
 from procedures.noise_limits import NoiseLimits, launch_checks
 from procedures.procedure import JudgedParameters, Outcome
@@ -100,7 +100,7 @@ def analyse_launches(
     settings = params.settings()
     if params.band_launch > len(recordings):
         raise BadParameter("band_launch", params.band_launch, f"1 … {len(recordings)}, the launches that there are")
-    labels = [_label(r, i) for i, r in enumerate(recordings, start=1)]
+    labels = titles(recordings)
     launches = tuple(_matched(launch, unit) for launch in all_launches(recordings, labels, settings))
     names = {tuple((c.channel, c.rate_unit) for c in launch.channels) for launch in launches}
     if len(names) > 1:
@@ -157,7 +157,3 @@ def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
         for channel in launch.channels:
             found += (f"{begin}{channel.channel}: {sentence}" for sentence in channel.warnings)
     return tuple(dict.fromkeys(found))
-
-
-def _label(recording: Recording, number: int) -> str:
-    return recording.info.station.label if recording.info.station else f"recording {number}"

@@ -1,9 +1,12 @@
 """Routes of procedures: the procedures of the bench, and previews of a plan before anything moves."""
 
+from collections.abc import Iterable
+from functools import cache
 from typing import Annotated, Any
 
 from fastapi import Request as HttpRequest
-from pydantic import BaseModel, Field, ValidationError
+from fastapi import Response
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import Problem, problem_of, problems
@@ -85,19 +88,41 @@ class PreviewOutcomes(BaseModel):
     items: list[PreviewOutcome]
 
 
-def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -> ProcedureView:
-    return copied(
-        ProcedureView,
-        entry,
-        parameters=entry.params.model_json_schema(),
-        result=entry.result.model_json_schema(mode="serialization"),
-    )
+AnyEntry = Procedure[Parameters, Outcome] | Method[Parameters, Outcome]
+VIEWS = TypeAdapter(list[ProcedureView])
 
 
-@router.get("/procedures", responses=problems())
-def list_procedures(service: Service) -> list[ProcedureView]:
+def _view(entry: AnyEntry) -> ProcedureView:
+    parameters, result = _schemas(entry.params, entry.result)
+    return copied(ProcedureView, entry, parameters=parameters, result=result)
+
+
+@cache
+def _schemas(params: type[Parameters], result: type[Outcome]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """JSON Schemas of parameters and result; making all of them takes longer than most answers, and none changes."""
+    return params.model_json_schema(), result.model_json_schema(mode="serialization")
+
+
+@cache
+def _listed(*entries: tuple[str, str, str, type[Parameters], type[Outcome]]) -> bytes:
+    """The catalogue as JSON, made once: every page with a choice of procedures asks for it."""
+    views = [
+        ProcedureView(name=name, title=title, version=version, parameters=schemas[0], result=schemas[1])
+        for name, title, version, *classes in entries
+        for schemas in [_schemas(*classes)]
+    ]
+    return VIEWS.dump_json(views)
+
+
+def _answer(entries: Iterable[AnyEntry]) -> Response:
+    listed = _listed(*((each.name, each.title, each.version, each.params, each.result) for each in entries))
+    return Response(listed, media_type="application/json")
+
+
+@router.get("/procedures", response_model=list[ProcedureView], responses=problems())
+def list_procedures(service: Service) -> Response:
     """List every procedure, with the JSON Schemas of its parameters and its result."""
-    return [_view(procedure) for procedure in service.catalogue.procedures.values()]
+    return _answer(service.catalogue.procedures.values())
 
 
 @router.get("/procedures/{name}", responses=problems(404))
@@ -153,7 +178,7 @@ def _preview(procedure: str, unit: str, plan: Plan) -> Preview:
     )
 
 
-@router.get("/methods", tags=["analyses"], responses=problems())
-def list_methods(service: Service) -> list[ProcedureView]:
+@router.get("/methods", response_model=list[ProcedureView], tags=["analyses"], responses=problems())
+def list_methods(service: Service) -> Response:
     """List every method that can be run on recordings or calibrations, with its JSON Schemas."""
-    return [_view(method) for method in service.catalogue.methods.values()]
+    return _answer(service.catalogue.methods.values())

@@ -1,7 +1,6 @@
 """Routes of recordings: list them, export samples, and import a recorded file."""
 
-from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated
 
 from anyio import CapacityLimiter, to_thread
 from fastapi import File, Form, Query, Request, Response, UploadFile
@@ -14,6 +13,7 @@ from bench_service.api.http.bodies import refuse_unfit
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.queries import Searched
+from bench_service.api.recording_views import RecordingPage, RecordingView
 from bench_service.evidence.admission import Places
 from bench_service.evidence.recordings import require_undamaged
 from bench_service.formats.description import ImportDescription
@@ -24,63 +24,12 @@ from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal
 from bench_service.formats.samples_out.naming import file_stem
 from bench_service.jobs.numbers import job_id_of
-from bench_service.mapping import copied
-from bench_service.model.raw_data import RawState
-from bench_service.model.records import RecordingState, StoredRecording
+from bench_service.model.records import StoredRecording
 from bench_service.routing import Routes
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
-from procedures.core.measured import Measured
-from procedures.core.recording import Channel, Station
 
 router = Routes(prefix="/api/v1/recordings", tags=["recordings"])
-
-
-class RecordingView(BaseModel):
-    """A recording without its samples."""
-
-    id: str
-    unit: str
-    job: str | None
-    bench: str | None
-    station: Station | None
-    state: RecordingState
-    channels: list[Channel]
-    rate_hz: float
-    count: int
-    duration_s: float
-    start_s: float
-    launched_s: float | None = Field(description="Bench time at which the unit was switched on; null: not known")
-    measured: Measured | None = Field(
-        description="Means of encoders and supply during the recording; null: they were not read"
-    )
-    content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
-    simulated: bool
-    stored_bytes: int
-    chunks: int
-    created_at: datetime
-    raw: RawState = Field(description="Where the raw samples are; `removed`: reading them answers 410")
-    raw_changed_at: datetime | None = Field(description="When the samples were moved there; null: never moved")
-    source: dict[str, Any] = Field(
-        description="Import: files, description, and `clock`, what its stamps say. Bench with a bench file: "
-        "`origin` (real, mixed or simulated) and `devices`, with identities and certificates"
-    )
-    warnings: list[str] = Field(description="Findings of the import that a person should know")
-    results: list[str] | None = Field(
-        None, description="Results that used the recording, in the answer about this one alone"
-    )
-
-    @classmethod
-    def of(cls, stored: StoredRecording, results: tuple[str, ...] | None = None) -> "RecordingView":
-        warnings = [str(warning) for warning in stored.source.get("warnings", ())]
-        return copied(cls, stored, stored.info, job=stored.job_id, warnings=warnings, results=results)
-
-
-class RecordingPage(BaseModel):
-    """One page of recordings, newest first."""
-
-    items: list[RecordingView]
-    next: str | None
 
 
 EXPORTS = Places("exports", most=8, most_bytes=100_000_000)
@@ -113,14 +62,19 @@ def list_recordings(
     page = service.stores.recordings.list(
         job_id=job_id, unit=unit, simulated=simulated, search=search, after=after, limit=limit
     )
-    return RecordingPage(items=[RecordingView.of(r) for r in page.items], next=page.next)
+    headings = service.stores.jobs.headings(sorted({r.job_id for r in page.items if r.job_id is not None}))
+    items = [RecordingView.of(r, heading=headings.get(r.job_id or "")) for r in page.items]
+    return RecordingPage(items=items, next=page.next)
 
 
 @router.get("/{recording_id}", responses=problems(404))
 def read_recording(recording_id: str, service: Service) -> RecordingView:
     """Read one recording with its channels, its hash and the results that used it."""
     stored = service.stores.recordings.get(recording_id)
-    return RecordingView.of(stored, service.stores.results.of_recording(recording_id))
+    headings = service.stores.jobs.headings([] if stored.job_id is None else [stored.job_id])
+    return RecordingView.of(
+        stored, service.stores.results.of_recording(recording_id), headings.get(stored.job_id or "")
+    )
 
 
 @router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404, 409, 410), **DATA})

@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 from bench_service.api.http.dependencies import ClientName, ProvenName, Service
 from bench_service.api.http.errors import problems
 from bench_service.api.http.fields import Request
-from bench_service.api.recordings import RecordingView
+from bench_service.api.recording_views import RecordingView
 from bench_service.mapping import copied
 from bench_service.model.raw_data import Growth, Hold, Keeping, Prediction, RawPlan, RawState, Share, StorageReport
 from bench_service.routing import Routes

@@ -8,7 +8,7 @@ from pydantic import Field
 from bench_service.api.http.dependencies import IdempotencyKey, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import Request
-from bench_service.api.recordings import RecordingView
+from bench_service.api.recording_views import RecordingView
 from bench_service.evidence.imports import Synthesis
 from bench_service.routing import Routes
 from procedures.core import units

@@ -1,6 +1,7 @@
 """The known benches: the one that this process drives, and all that workers have registered."""
 
 from collections.abc import Callable, Iterable
+from datetime import datetime, timedelta
 
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.registry import BenchRegistry
@@ -8,6 +9,15 @@ from bench_service.evidence.units import UnitStore
 from bench_service.model.errors import NotFound
 from procedures.bench import BenchDescription
 from procedures.core.unit import Unit
+
+DUE_SOON = timedelta(days=30)
+"""Time before its end from which people are told of a device's certificate."""
+
+
+def certificates_due(bench: BenchDescription, at: datetime) -> tuple[str, ...]:
+    """Return a sentence for each certificate of a bench's devices that has expired at a moment, or does so soon."""
+    today, last = at.date().isoformat(), (at + DUE_SOON).date().isoformat()
+    return (*bench.overdue(today), *bench.due_between(today, last))
 
 
 class BenchDirectory:

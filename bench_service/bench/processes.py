@@ -77,7 +77,13 @@ class Watch(Protocol):
         ...
 
     def supervisor(self) -> ProcessIdentity | None:
-        """Return the process that supervises the bench on this host, if one is alive; else None."""
+        """Return the process that supervises the bench on this host, if one is alive and gives its heartbeat; else
+        None.
+        """
+        ...
+
+    def silent_supervisor(self) -> ProcessIdentity | None:
+        """Return the supervisor of this host that is alive and gives no heartbeat: it hangs, or is suspended."""
         ...
 
 

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
@@ -37,7 +37,9 @@ class Safety:
     worker: ProcessIdentity | None
     """The process of this host that drives the bench, if one is alive."""
     supervisor: ProcessIdentity | None
-    """The process of this host that supervises it, if one is alive."""
+    """The process of this host that supervises it, if one is alive and gives its heartbeat."""
+    silent_supervisor: ProcessIdentity | None = None
+    """The supervisor of this host that is alive and gives no heartbeat: nobody watches over the bench."""
 
     @property
     def commanded(self) -> bool:
@@ -69,11 +71,14 @@ class SafetyService:
         state = self._devices(bench_id).device_state()
         watch = self._watch(bench_id)
         worker, supervisor = living(watch.driving()), watch.supervisor()
+        silent = watch.silent_supervisor()
         if state is None:
             safe, explanation = _elsewhere(bench_id, self._benches.standing_stops(bench_id))
         else:
             safe, explanation = state.safe, _here(bench_id, state, worker, supervisor)
-        return Safety(safe, explanation, state, worker, supervisor)
+            if silent is not None:
+                explanation += f" Its supervisor, {silent}, gives no heartbeat: nobody watches over the bench."
+        return Safety(safe, explanation, state, worker, supervisor, silent)
 
     def stopping(self, bench_id: str, patient: bool = True) -> Safety:
         """The safety of a bench on this host shortly after its stop was requested; needs no database.
@@ -86,7 +91,7 @@ class SafetyService:
             obstacle = over_new_link(self._devices(bench_id), self._by)
             found = self.known(bench_id)
             done = f"This service tried itself: {obstacle}." if obstacle else "This service made it safe itself."
-            return Safety(found.safe, f"{alone} {done}", found.devices, found.worker, found.supervisor)
+            return replace(found, explanation=f"{alone} {done}")
         return self._within(bench_id, found) if patient else found
 
     def stopping_elsewhere(self, bench_id: str) -> Safety:

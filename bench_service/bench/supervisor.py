@@ -43,6 +43,8 @@ LEFT_S = 5.0
 """Time after which devices are made safe that a living worker of a bench without a stop has left unsafe [s]: it could
 not reach them, nor the database to stop the bench.
 """
+LOOK_MARGIN_S = 30.0
+"""Added to a worker's longest time to be safe: a look that takes longer is stuck, and the heartbeat ends [s]."""
 LINGER_S = 60.0
 """Time that the supervisor stays after a crash of the worker, once the bench is safe [s]."""
 
@@ -92,7 +94,12 @@ class Supervisor:
         """Time of the first failed attempt to make the devices safe; None: none has failed."""
         self._left_since_s: float | None = None
         self._gone_since_s: float | None = None
-        self._looked_s = monotonic_s()
+        self._looked_s = self._began_s = monotonic_s()
+        self._longest_look_s = hung_s + LOOK_MARGIN_S
+
+    def goes_on(self) -> bool:
+        """Return whether the looks go on: none takes longer than the slowest device may take to be safe, and some."""
+        return monotonic_s() - self._began_s < self._longest_look_s
 
     def run(self, ending: Event, companion: bool) -> None:
         """Watch, and block, until `ending` is set; a `companion` also ends with the process that it accompanies."""
@@ -107,6 +114,7 @@ class Supervisor:
 
     def _look_once(self, listening: socket.socket | None, ending: Event, companion: bool) -> bool:
         """Wait for a message or for `LOOK_S`, then look; True while there is something left to watch."""
+        self._began_s = monotonic_s()
         if listening is None:
             ending.wait(LOOK_S)
         elif select.select((listening,), (), (), LOOK_S)[0]:

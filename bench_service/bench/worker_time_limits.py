@@ -7,7 +7,7 @@ held up itself makes a worker late.
 
 from math import inf
 
-from bench_service.bench.heartbeat import HeartbeatFile
+from bench_service.bench.heartbeat import COUNTED_S, HeartbeatFile
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.stop.channel import WORKER, StopChannel
 
@@ -22,8 +22,6 @@ MARGIN_S = 5.0
 afterwards."""
 ENDING_S = 20.0
 """Shortest time that a service that ends waits for its bench to be safe [s]."""
-COUNTED_S = 0.5
-"""Maximum part of the time between two looks that counts [s]: this process may have been held up itself."""
 
 
 def hung_after_s(safe_s: float) -> float:

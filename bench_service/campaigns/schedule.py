@@ -1,4 +1,4 @@
-"""Schedules of campaigns: a cron expression in a time zone, and the rules for missed starts.
+"""Schedules of campaigns: a cron expression in a time zone, or one moment, and the rules for missed starts.
 
 Where clocks are set forward, a start in the hour that is left out is made up at its end; a day that a zone leaves out
 has none. Where clocks are set back, a start at a fixed hour happens once, in the first of the two hours, and one of
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
+from typing import Protocol
 from zoneinfo import ZoneInfo
 
 from procedures.core.errors import BadParameter
@@ -18,6 +19,8 @@ FIELDS = 5
 LOOK_BACK = timedelta(days=2)
 """Time back over which the latest missed start is searched first: of many missed starts the latest counts."""
 
+FARTHEST = timedelta(days=50 * 366)
+"""Longest time ahead of a single start."""
 AHEAD = timedelta(hours=1)
 """Longest step back of the clock that counts as a correction: starts already made are not repeated. After a longer one
 the earlier time counts as wrong."""
@@ -43,24 +46,24 @@ class Overlap(StrEnum):
 @dataclass(frozen=True)
 class Schedule:
     """A campaign that is run on a unit repeatedly, by a cron expression in a time zone, with its next and last
-    start; or once, at the next start alone.
+    start; or exactly once, at a moment with its date.
     """
 
     id: str
-    cron: str
-    time_zone: str
-    """IANA name of the time zone, such as Europe/Kyiv."""
     campaign: str
     unit: str
     created_at: datetime
+    cron: str | None = None
+    time_zone: str | None = None
+    """IANA name of the time zone of the expression, such as Europe/Kyiv."""
+    at: datetime | None = None
+    """The only start, in place of cron and time zone: after it the schedule is off, and stays off."""
     bench: str | None = None
     enabled: bool = True
     missed: Missed = Missed.RUN_ONCE
     start_within_s: float = 300.0
     """Delay beyond which a start counts as missed [s]."""
     overlap: Overlap = Overlap.SKIP
-    once: bool = False
-    """Whether the next start is the only one: after it the schedule is switched off."""
     labels: dict[str, str] = field(default_factory=dict[str, str])
     team: str = ""
     """Team whose members change it, and act on its runs; empty: every engineer, and every operator on the runs."""
@@ -79,6 +82,54 @@ def zone_of(name: str) -> ZoneInfo:
         return ZoneInfo(name)
     except (KeyError, ValueError, OSError):  # OSError: the name of a folder of zones
         raise BadParameter("time_zone", name, "the IANA name of a time zone, such as Europe/Kyiv or UTC") from None
+
+
+class Times(Protocol):
+    """The times of a schedule, or of a request for one: cron expression and time zone, or one moment. Interface."""
+
+    @property
+    def cron(self) -> str | None: ...
+
+    @property
+    def time_zone(self) -> str | None: ...
+
+    @property
+    def at(self) -> datetime | None: ...
+
+
+def first_start(times: Times, moment: datetime) -> datetime:
+    """Return the first start of a schedule after a moment, in UTC. Raises `BadParameter` where its times are not of one
+    of the two kinds, never come, or are over.
+    """
+    if times.at is None:
+        if times.cron is None:
+            raise BadParameter("cron", None, "a cron expression for repeated starts, or `at` for a single one")
+        return next_start(times.cron, _zone_name(times), moment)
+    if times.cron is not None or times.time_zone is not None:
+        raise BadParameter("at", times.at.isoformat(), "alone: cron and time_zone belong to repeated starts")
+    at = times.at.astimezone(UTC)
+    if not moment < at <= moment + FARTHEST:
+        allowed = f"a moment after {moment.isoformat(timespec='seconds')}, at most 50 years ahead"
+        raise BadParameter("at", times.at.isoformat(), allowed)
+    return at
+
+
+def start_after(schedule: Schedule, moment: datetime) -> datetime | None:
+    """The start of a stored schedule that follows a moment, in UTC; None after the only one. Raises `BadParameter`."""
+    return next(iter(_starts(schedule, moment)), None)
+
+
+def _starts(schedule: Schedule, moment: datetime) -> Iterator[datetime]:
+    """All starts of a stored schedule after a moment."""
+    if schedule.at is None:
+        return starts_after(schedule.cron or "", _zone_name(schedule), moment)
+    return iter((schedule.at,) if schedule.at > moment else ())
+
+
+def _zone_name(times: Times) -> str:
+    if times.time_zone is None:
+        raise BadParameter("time_zone", None, "the IANA name of the cron expression's time zone, such as Europe/Kyiv")
+    return times.time_zone
 
 
 def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[datetime]:
@@ -148,7 +199,7 @@ def latest_due(schedule: Schedule, at: datetime) -> datetime:
     assert schedule.next_at is not None
     latest = schedule.next_at
     for begin in (max(schedule.next_at, at - LOOK_BACK), schedule.next_at):
-        for start in starts_after(schedule.cron, schedule.time_zone, begin):
+        for start in _starts(schedule, begin):
             if start > at:
                 break
             latest = start
@@ -166,7 +217,5 @@ def brought_back(schedule: Schedule, at: datetime) -> datetime | None:
     """
     if schedule.next_at is None or (schedule.last_at is not None and at < schedule.last_at <= at + AHEAD):
         return None
-    first = next(
-        (start for start in starts_after(schedule.cron, schedule.time_zone, at) if start != schedule.last_at), None
-    )
+    first = next((start for start in _starts(schedule, at) if start != schedule.last_at), None)
     return first if first is not None and first < schedule.next_at else None

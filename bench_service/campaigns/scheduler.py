@@ -17,10 +17,25 @@ from math import inf
 from bench_service.campaigns import transitions
 from bench_service.campaigns.campaign import Campaign
 from bench_service.campaigns.run import CampaignRun, RunRequest
-from bench_service.campaigns.schedule import Missed, Overlap, Schedule, brought_back, latest_due, next_start
+from bench_service.campaigns.schedule import (
+    Missed,
+    Overlap,
+    Schedule,
+    brought_back,
+    first_start,
+    latest_due,
+    start_after,
+)
 from bench_service.campaigns.stores import Stores
 from bench_service.mapping import copied
-from bench_service.model.errors import IdempotencyConflict, NotFound, ServiceError, StorageFailure, StorageFull
+from bench_service.model.errors import (
+    IdempotencyConflict,
+    IllegalTransition,
+    NotFound,
+    ServiceError,
+    StorageFailure,
+    StorageFull,
+)
 from bench_service.model.records import Idempotency, Page
 from bench_service.wall_clock import monotonic_s, new_id, now
 from procedures.core.errors import DomainError
@@ -32,17 +47,19 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ScheduleRequest:
-    """A client's request for a schedule: cron expression, time zone, campaign, unit, bench, rules for missed starts."""
+    """A client's request for a schedule: cron expression and time zone, or one moment; campaign, unit, bench, rules for
+    missed starts.
+    """
 
-    cron: str
-    time_zone: str
     campaign: str
     unit: str
+    cron: str | None = None
+    time_zone: str | None = None
+    at: datetime | None = None
     bench: str | None = None
     missed: Missed = Missed.RUN_ONCE
     start_within_s: float = 300.0
     overlap: Overlap = Overlap.SKIP
-    once: bool = False
     enabled: bool = True
     labels: dict[str, str] = field(default_factory=dict[str, str])
 
@@ -74,13 +91,14 @@ class Scheduler:
         if known is not None:
             return self._kept(known)
         at = now()
-        next_at = next_start(request.cron, request.time_zone, at)
+        next_at = first_start(request, at)
         run = self._prepared(copied(RunRequest, request))
         schedule = copied(
             Schedule,
             request,
             id=new_id(),
             created_at=at,
+            at=None if request.at is None else next_at,
             bench=run.bench,
             next_at=next_at if request.enabled else None,
             team=team,
@@ -97,14 +115,18 @@ class Scheduler:
 
     def enable(self, schedule_id: str, enabled: bool) -> Schedule:
         """Switch a schedule on or off and return it; starts that passed while it was off are not made up. Raises
-        `NotFound`.
+        `NotFound`; and `IllegalTransition` for switching on one whose only start was, or has passed.
         """
         campaigns = self._stores.campaigns
         while True:
             schedule = campaigns.schedule(schedule_id)
             if schedule.enabled == enabled:
                 return schedule
-            next_at = next_start(schedule.cron, schedule.time_zone, now()) if enabled else None
+            next_at = start_after(schedule, now()) if enabled else None
+            if enabled and (next_at is None or (schedule.at is not None and schedule.last_at is not None)):
+                raise IllegalTransition(
+                    f"schedule {schedule_id} has one start alone, {schedule.at}, and that is over: add another schedule"
+                )
             changed = replace(schedule, enabled=enabled, next_at=next_at)
             if campaigns.save_schedule(changed, schedule.next_at, None):
                 return changed
@@ -158,8 +180,8 @@ class Scheduler:
         run, outcome = self._started(schedule, planned, at)
         changed = replace(
             schedule,
-            enabled=not schedule.once,
-            next_at=None if schedule.once else next_start(schedule.cron, schedule.time_zone, at),
+            enabled=schedule.at is None,
+            next_at=None if schedule.at is not None else start_after(schedule, at),
             last_at=planned,
             last_run=schedule.last_run if run is None else run.id,
             last_outcome=outcome,

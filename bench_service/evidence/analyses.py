@@ -181,11 +181,20 @@ class AnalysisService:
 
     def _complete(self, ids: Sequence[str]) -> tuple[Recording, ...]:
         """Recordings by their ids. Raises `NotFound`, and `UnfitRecording` for one that was interrupted."""
-        for recording_id in ids:
-            stored = self._stores.recordings.get(recording_id)
+        found = [self._stores.recordings.get(recording_id) for recording_id in ids]
+        for stored in found:
             if stored.state is not RecordingState.COMPLETE:
-                raise UnfitRecording(f"recording {recording_id} is {stored.state.value}: kept, but not for analysis")
-        return tuple(self._stores.recordings.load(recording_id) for recording_id in ids)
+                raise UnfitRecording(f"recording {stored.info.id} is {stored.state.value}: kept, but not for analysis")
+        several = len({stored.job_id for stored in found}) > 1
+        jobs = {stored.job_id for stored in found if stored.job_id is not None and several}
+        begins = {job_id: f"job #{self._read_job(job_id).number}" for job_id in sorted(jobs)}
+        names = [
+            ", ".join([begins[one.job_id], *([one.info.station.label] if one.info.station else [])])
+            if one.job_id in begins
+            else ""
+            for one in found
+        ]
+        return tuple(self._stores.recordings.load(one.info.id, name) for one, name in zip(found, names, strict=True))
 
 
 def _unit_of(of_evidence: set[str], named: str | None) -> str | None:

@@ -91,9 +91,11 @@ class RecordingStore(Protocol):
         """Return the complete recordings of a job in the order of their stations, without samples."""
         ...
 
-    def load(self, recording_id: str) -> RecordingSoFar:
+    def load(self, recording_id: str, name: str = "") -> RecordingSoFar:
         """Return a recording for an analysis: its blocks are read chunk by chunk when they are used. Raises `NotFound`,
         `RawDataRemoved`.
+
+        `name`: its name in the texts of the analysis; empty: that of its file.
         """
         ...
 

@@ -1,5 +1,6 @@
 """Interface of the store of units under test, as they are declared."""
 
+from collections.abc import Collection
 from typing import Protocol
 
 from bench_service.model.errors import NotFound
@@ -19,7 +20,13 @@ class UnitStore(Protocol):
         """Return a unit with its current calibration and corrections. Raises `NotFound`."""
         ...
 
-    def units(self) -> tuple[Unit, ...]: ...
+    def units(self, serials: Collection[str] | None = None) -> tuple[Unit, ...]:
+        """Return the units with these serials, or all of them, in the order of the serials."""
+        ...
+
+    def serials(self) -> tuple[str, ...]:
+        """Return the serials of all units in their order, without their records."""
+        ...
 
 
 def register(units: UnitStore, unit: Unit) -> None:

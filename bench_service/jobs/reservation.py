@@ -72,3 +72,9 @@ class ReservationStore(Protocol):
     def end(self, reservation_id: str, at: datetime) -> Reservation:
         """End a reservation early and return it; one that is over stays as it is. Raises `NotFound`."""
         ...
+
+
+def reservation_of_bench(store: ReservationStore, bench_id: str, at: datetime) -> Reservation | None:
+    """Return the reservation that a bench is under at a moment; None where it is under none."""
+    active = store.list(active_at=at, limit=500).items
+    return next((one for one in active if one.kind is Reserved.BENCH and one.name == bench_id), None)

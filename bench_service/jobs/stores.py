@@ -12,7 +12,7 @@ from bench_service.bench.stores import BenchStores
 from bench_service.jobs.manual.store import ManualStore
 from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.reservation import ReservationStore
-from bench_service.model.job import Event, Failure, Job, JobState
+from bench_service.model.job import Event, Failure, Job, JobHeading, JobState
 from bench_service.model.records import Idempotency, Page
 from bench_service.model.search import EVERYTHING, Search
 from procedures.core.limits import Verdict
@@ -38,6 +38,10 @@ class JobStore(Protocol):
 
     def id_of(self, number: int) -> str:
         """Return the id of the job with a number. Raises `NotFound`."""
+        ...
+
+    def headings(self, ids: Sequence[str]) -> dict[str, JobHeading]:
+        """Return numbers and procedures of jobs by their ids; an id that no job has is left out."""
         ...
 
     def numbers(self, ids: Sequence[str]) -> dict[str, int]:

@@ -79,6 +79,14 @@ class Failure:
     station: int | None = None
 
 
+@dataclass(frozen=True)
+class JobHeading:
+    """Number and procedure of a job: as much as a list of its recordings shows of it."""
+
+    number: int
+    procedure: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class Job(JobTerms):
     """One job as it is stored. Times are UTC; `stations_done` counts recordings sealed so far."""

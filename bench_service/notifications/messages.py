@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import datetime
+from hashlib import sha256
 
 from bench_service.campaigns.run import CampaignRun
 from bench_service.model.job import Event, Job
@@ -79,6 +80,23 @@ def of_disk(bench: str, free: int, at: datetime) -> Message:
     """Make the message about a disk that is nearly full; its key has the date, so there is one a day."""
     text = f"{free / 1e6:.0f} MB are free on the disk of the database: recordings will soon be refused."
     return Message(f"disk-{at.date().isoformat()}", "disk", f"{bench}: the disk is nearly full", text, bench, at, "/")
+
+
+def of_certificate(bench: str, sentence: str, at: datetime) -> Message:
+    """Make the message about a device's certificate that has expired, or expires soon; its key has the sentence."""
+    digest = sha256(f"{bench} {sentence}".encode()).hexdigest()[:16]
+    text = f"On bench {bench} {sentence}."
+    return Message(f"certificate-{digest}", "certificate", f"{bench}: {sentence}", text, bench, at, f"/#bench-{bench}")
+
+
+def of_silent_supervisor(bench: str, supervisor: str, at: datetime) -> Message:
+    """Make the message about a supervisor that lives and gives no heartbeat; its key has the process."""
+    text = (
+        f"The supervisor, {supervisor}, gives no heartbeat: it hangs or is suspended, and nobody watches over the "
+        "bench. The process that drives the bench ends it and starts another one."
+    )
+    key = f"supervisor-{supervisor.replace(' ', '-')}"
+    return Message(key, "trouble", f"{bench}: its supervisor is silent", text, bench, at, f"/#bench-{bench}")
 
 
 def digest(messages: list[Message], bench: str, at: datetime) -> Message:

@@ -10,9 +10,19 @@ from collections.abc import Callable
 from threading import Event as Flag
 from threading import Thread
 
+from bench_service.bench.directory import certificates_due
+from bench_service.bench.processes import Watch
 from bench_service.campaigns.stores import Stores
 from bench_service.model.errors import ServiceError
-from bench_service.notifications.messages import Message, of_disk, of_event, of_run, of_stop
+from bench_service.notifications.messages import (
+    Message,
+    of_certificate,
+    of_disk,
+    of_event,
+    of_run,
+    of_silent_supervisor,
+    of_stop,
+)
 from bench_service.notifications.outbox import Outbox
 from bench_service.wall_clock import monotonic_s, now
 
@@ -37,12 +47,14 @@ class Notifier:
         outboxes: list[Outbox],
         free_bytes: Callable[[], int | None],
         least_free_bytes: int,
+        watch: Watch,
     ) -> None:
         self._bench = bench
         self._stores = stores
         self._outboxes = outboxes
         self._free_bytes = free_bytes
         self._least_free_bytes = least_free_bytes
+        self._watch = watch
         self._began = now()
         self._changed: deque[str] = deque(maxlen=10_000)
         self._known: dict[str, int] = {}
@@ -89,6 +101,9 @@ class Notifier:
             self._changed.popleft()  # after it was read: a database that is away loses nothing
         for stop in self._stores.benches.standing_stops(self._bench):
             self._tell(of_stop(stop))
+        silent = self._watch.silent_supervisor()
+        if silent is not None:
+            self._tell(of_silent_supervisor(self._bench, str(silent), now()))
         for run in self._stores.campaigns.runs(limit=RUNS).items:
             if run.bench == self._bench and (run.finished_at or self._began) > self._began:
                 self._tell(of_run(run, now()))
@@ -97,6 +112,12 @@ class Notifier:
             free = self._free_bytes()
             if free is not None and free < self._least_free_bytes:
                 self._tell(of_disk(self._bench, free, now()))
+            self._look_at_certificates()
+
+    def _look_at_certificates(self) -> None:
+        """Report certificates of the bench's devices that have expired, and those that expire within a month."""
+        for sentence in certificates_due(self._stores.benches.bench(self._bench), now()):
+            self._tell(of_certificate(self._bench, sentence, now()))
 
     def _jobs_news(self, job_id: str) -> None:
         job = self._stores.jobs.get(job_id)

@@ -8,8 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bench_service.model.errors import Misconfigured
 
-EventKind = Literal["verdict", "stop", "prompt", "trouble", "campaign", "disk"]
-EVERY: tuple[EventKind, ...] = ("verdict", "stop", "prompt", "trouble", "campaign", "disk")
+EventKind = Literal["verdict", "stop", "prompt", "trouble", "campaign", "disk", "certificate"]
+EVERY: tuple[EventKind, ...] = ("verdict", "stop", "prompt", "trouble", "campaign", "disk", "certificate")
 URGENT: tuple[EventKind, ...] = ("stop", "prompt")
 """Kinds that a person waits for or must act on: no limit holds them back."""
 Address = Annotated[str, Field(pattern=r"^[^@\s<>]+@[^@\s<>]+$", max_length=254)]

@@ -24,6 +24,6 @@ def mountings_page(request: Request) -> HTMLResponse:
     repeat.
     """
     service = service_of(request)
-    units = [unit.serial for unit in service.stores.units.units()]
+    units = service.stores.units.serials()
     context = {"benches": service.benches.ids(), "units": units}
     return templates.TemplateResponse(request, "mountings.html", context)

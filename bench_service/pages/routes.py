@@ -6,8 +6,10 @@ from typing import Any
 from fastapi import Request
 from fastapi.responses import HTMLResponse
 
+from bench_service.bench.directory import certificates_due
 from bench_service.formats.calibration_exports.forms import CalibrationForm
 from bench_service.jobs.numbers import job_id_of
+from bench_service.jobs.reservation import reservation_of_bench
 from bench_service.model.errors import NotFound
 from bench_service.model.job import FINAL, Event, Job, JobState
 from bench_service.model.records import StoredResult
@@ -16,6 +18,7 @@ from bench_service.pages.images import SHELF
 from bench_service.pages.rendering import service_of, templates
 from bench_service.routing import Routes
 from bench_service.service import BenchService
+from bench_service.wall_clock import now
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
 from procedures.core.report import Figure
@@ -26,6 +29,8 @@ router = Routes(include_in_schema=False, default_response_class=HTMLResponse)
 
 SHOWN_EVENTS = 300
 """Number of a job's latest events that its page lists."""
+SHOWN_UNITS = 20
+"""Number of units that the first page lists, those that a bench has before the others."""
 SHOWN_SOURCES = 20
 """Number of an analysis's recordings that its page lists by name."""
 _VERBS = {
@@ -129,8 +134,9 @@ def home(request: Request) -> HTMLResponse:
     """Return the HTML page of the benches, their units and the latest jobs."""
     service = service_of(request)
     queued = service.stores.queue.lengths()
-    units = service.stores.units.units()
-    testable = service.benches.testable(unit.serial for unit in units)
+    serials = service.stores.units.serials()
+    testable = service.benches.testable(serials)
+    first = sorted(serials, key=lambda serial: serial not in testable)[:SHOWN_UNITS]
     return _page(
         request,
         "home.html",
@@ -142,11 +148,14 @@ def home(request: Request) -> HTMLResponse:
                 "stops": service.stores.benches.standing_stops(bench_id),
                 "driven": service.benches.driven(bench_id),
                 "queued": queued.get(bench_id, 0),
+                "reserved": reservation_of_bench(service.stores.reservations, bench_id, now()),
+                "certificates": certificates_due(service.benches.description(bench_id), now()),
             }
             for bench_id in service.benches.ids()
         ],
         jobs=service.stores.jobs.list(limit=20).items,
-        units=sorted(units, key=lambda unit: unit.serial not in testable),
+        units=sorted(service.stores.units.units(first), key=lambda unit: unit.serial not in testable),
+        unit_count=len(serials),
         testable=testable,
     )
 

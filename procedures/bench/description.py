@@ -96,6 +96,14 @@ class BenchDescription:
             if (c := d.certificate) is not None and c.overdue(today)
         )
 
+    def due_between(self, today: str, last: str) -> tuple[str, ...]:
+        """Return a sentence for each certificate whose last day is one of `today` … `last` (ISO 8601)."""
+        return tuple(
+            f"the certificate {c.number} of the {d.name} expires soon: it is valid until {c.due}"
+            for d in self.devices
+            if (c := d.certificate) is not None and today <= c.due <= last
+        )
+
     @property
     def axis_motion(self) -> tuple[tuple[float, float], ...]:
         """(rate_deg_s, acceleration_deg_s2) of outer, middle and inner axis."""

@@ -175,6 +175,14 @@ class RecordingInfo:
     measured: Measured | None = None
     """Readings of table and supply meanwhile; None where there are none. The station keeps the commanded angles."""
 
+    name: str = ""
+    """Name by which people know it, such as that of its file; empty: it is known by its station, or by its id alone."""
+
+    @property
+    def title(self) -> str:
+        """Name of the recording in a text for people: its own, else the label of its station, else its id."""
+        return self.name or (self.station.label if self.station else self.id)
+
     @property
     def duration_s(self) -> float:
         return self.count / self.rate_hz
@@ -238,6 +246,15 @@ class Stretch:
                 yield part
             if seen >= self.stop:
                 return
+
+
+def titles(recordings: Sequence[Recording]) -> list[str]:
+    """Return the titles of several recordings, in their order; equal ones carry the beginning of the id as well."""
+    plain = [recording.info.title for recording in recordings]
+    return [
+        f"{title} ({recording.info.id[:8]})" if plain.count(title) > 1 and recording.info.id != title else title
+        for title, recording in zip(plain, recordings, strict=True)
+    ]
 
 
 def cut(recording: Recording, start_s: float | None, stop_s: float | None) -> Recording:

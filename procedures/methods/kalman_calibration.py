@@ -176,7 +176,7 @@ def _of_channel(
         else None
     )
     return ChannelBias(
-        recording=info.station.label if info.station else info.id,
+        recording=info.title,
         channel=name,
         unit=rate_unit,
         noise="observed" if noise is None else "record",

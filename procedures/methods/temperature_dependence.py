@@ -32,7 +32,7 @@ from procedures.analysis.thermal.runs import without_lag
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import significance, verdict
-from procedures.core.recording import AROUND, GYRO, Quantity, Recording, RecordingInfo
+from procedures.core.recording import AROUND, GYRO, Quantity, Recording, RecordingInfo, titles
 from procedures.core.report import Report
 from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
 from procedures.core.temperature.thermometers import ThermometerCorrection
@@ -105,6 +105,8 @@ class Result(Outcome):
     gyro_correction: GyroThermalCorrection | None
     trace_c: tuple[tuple[float, ...], ...]
     """Temperature of each recording in cells, by the first channel's sensor."""
+    recordings: tuple[str, ...] = ()
+    """Title of each recording; empty in results from before titles were stored."""
 
 
 INDEPENDENCE = "independence of temperature, p-value"
@@ -139,6 +141,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
         thermometers=(unit.thermometers_id or "") if unit is not None and applied else "",
         gyro_correction=_gyros([c for c, _ in found], temperatures, params, known),
         trace_c=tuple(tuple((s.departure_c + params.reference_c).tolist()) for s in found[0][1]),
+        recordings=tuple(titles(recordings)),
     )
 
 
@@ -283,7 +286,7 @@ def corrections(result: Result) -> tuple[UnitCorrection, ...]:
 
 def report(result: Result) -> Report:
     """Return the report: coefficients and orders, soaks, repeatability, and the temperature itself."""
-    return dependence_report(result.channels, result.reference_c, result.trace_c)
+    return dependence_report(result.channels, result.reference_c, result.trace_c, result.recordings)
 
 
 METHOD = Method(

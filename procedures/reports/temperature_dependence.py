@@ -38,16 +38,22 @@ class Dependence(Protocol):
     def repeatability(self) -> tuple[Repeatability, ...]: ...
 
 
-def dependence_report(found: Sequence[Dependence], reference_c: float, trace_c: Sequence[Sequence[float]]) -> Report:
-    """Return the report: coefficients and orders, soaks, repeatability, and the temperature of each recording."""
+def dependence_report(
+    found: Sequence[Dependence], reference_c: float, trace_c: Sequence[Sequence[float]], titles: Sequence[str]
+) -> Report:
+    """Return the report: coefficients and orders, soaks, repeatability, and the temperature of each recording.
+
+    `titles`: of the recordings, in their order; without them they are counted.
+    """
+    names = titles or [f"recording {number}" for number in range(1, len(trace_c) + 1)]
     tables = [_fits(found), _coefficients(found, reference_c)]
     if any(c.soaks for c in found):
         tables += [_soaks(found), _repeated(found)]
     series = tuple(
-        Series(f"recording {k}", tuple(float(i) for i in range(len(t))), tuple(t), style="line")
-        for k, t in enumerate(trace_c, start=1)
+        Series(name, tuple(float(i) for i in range(len(t))), tuple(t), style="line")
+        for name, t in zip(names, trace_c, strict=True)
     )
-    figures = [Figure("Temperature", "cell", "°C", series), *(_levels(c) for c in found if c.soaks)]
+    figures = [Figure("Temperature", "cell", "°C", series), *(_levels(c, names) for c in found if c.soaks)]
     return Report(sections=(*tables, *figures))
 
 
@@ -102,11 +108,11 @@ def _repeated(found: Sequence[Dependence]) -> Table:
     return Table("Repeatability of the soaks", columns, tuple(rows), note)
 
 
-def _levels(found: Dependence) -> Figure:
+def _levels(found: Dependence, names: Sequence[str]) -> Figure:
     numbers = sorted({s.recording for s in found.soaks})
     series = tuple(
         Series(
-            f"recording {n + 1}",
+            names[n],
             tuple(s.temperature_c for s in found.soaks if s.recording == n),
             tuple(s.level for s in found.soaks if s.recording == n),
             tuple(s.level_sd for s in found.soaks if s.recording == n),

@@ -8,7 +8,7 @@ least processor time over that of the size, by least squares, over the sizes tha
 
 The largest history stays in `--keep` where that is given, and a second run there measures it without making it again.
 
-    python -m tests.benchmarks.lists [--jobs 100000] [--only sqlite] [--keep FOLDER]
+    python -m tests.benchmarks.lists [--jobs 100000] [--only sqlite] [--keep FOLDER] [--largest]
 
 Exit code 1: a budget is exceeded.
 """
@@ -108,6 +108,34 @@ def addresses(client: httpx.Client, real: str, begin_ms: int, jobs: int) -> dict
         "page of a unit": f"/units/{UNIT}",
         "page of a trend": f"/units/{UNIT}/trend?procedure={PROCEDURE}&quantity={QUANTITY}",
         "page of a recording": f"/recordings/{recordings[0]['id']}",
+        "page of the jobs": "/jobs",
+        "page of the queue": "/queue",
+        "page of the recordings": "/recordings",
+        "page of the units": "/units",
+        "page of the campaigns": "/campaigns",
+        "page of a start": "/start",
+        "page of the audit trail": "/audit",
+        "page of the mountings": "/mountings",
+        "page of manual mode": "/benches/sim/manual",
+        "page of the stops": "/benches/sim/stops",
+        **_asked_by_pages(),
+    }
+
+
+def _asked_by_pages() -> dict[str, str]:
+    """Addresses of the API that the pages use in addition to their lists."""
+    return {
+        "jobs page: the catalogue": "/api/v1/procedures",
+        "jobs page: 50 found": "/api/v1/jobs?limit=50",
+        "recordings page: 50 found": "/api/v1/recordings?limit=50",
+        "recordings page: methods": "/api/v1/methods",
+        "start page: units": "/api/v1/units",
+        "queue page": "/api/v1/benches/sim/queue",
+        "queue page: reservations": "/api/v1/reservations?active=true&limit=100",
+        "audit page": "/api/v1/audit?limit=50",
+        "approvals": "/api/v1/approvals",
+        "unit page": f"/api/v1/units/{UNIT}",
+        "unit page: calibrations": f"/api/v1/units/{UNIT}/calibrations",
     }
 
 
@@ -169,10 +197,11 @@ def prepared(url: str) -> str:
         return job
 
 
-def measured(url: str, most: int, about: Path, server: psutil.Process | None = None) -> bool:
+def measured(url: str, most: int, about: Path, server: psutil.Process | None = None, only: bool = False) -> bool:
     """Print every address at every size of the history; false where a budget is exceeded.
 
-    `about`: the file that says what an earlier run has left at `url`; written once a history is whole.
+    `about`: the file that says what an earlier run has left at `url`; written once a history is whole. `only`: at the
+    largest size alone, which shows no growth.
     """
     kept = History(**json.loads(about.read_text())) if about.exists() else None
     begin_ms = kept.begin_ms if kept else round(now().timestamp() * 1000) - (most + 1) * STEP_MS
@@ -180,7 +209,8 @@ def measured(url: str, most: int, about: Path, server: psutil.Process | None = N
     found: dict[str, list[Row]] = {}
     starts: list[float] = []
     already = 0
-    for size in [kept.jobs] if kept else sorted({max(600, most // part) for part in (1000, 100, 10, 1)}):
+    parts = (1,) if only else (1000, 100, 10, 1)
+    for size in [kept.jobs] if kept else sorted({max(600, most // part) for part in parts}):
         if kept is None:
             _, database = open_stores(url)
             seed(database, real, size, begin_ms, already)
@@ -218,12 +248,15 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=100_000)
     parser.add_argument("--only", choices=["sqlite", "postgres"])
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--largest", action="store_true", help="at the largest size alone")
     given = parser.parse_args()
     kept = True
     if given.only != "postgres":
         with _folder(given.keep, "sqlite") as folder:
             print("SQLite: p95 of processor time at each size, of wall time at the largest")
-            kept &= measured(f"sqlite:///{folder / 'bench.sqlite'}", given.jobs, folder / "history.json")
+            kept &= measured(
+                f"sqlite:///{folder / 'bench.sqlite'}", given.jobs, folder / "history.json", only=given.largest
+            )
     if given.only != "sqlite":
         with _folder(given.keep, "postgres") as folder:
             data = folder / "data"
@@ -232,7 +265,7 @@ def main() -> int:
                 print("Postgres: p95 of processor time at each size, of wall time at the largest")
                 master = psutil.Process(int((server.pgdata / "postmaster.pid").read_text().split()[0]))
                 url = server.get_uri(driver="psycopg")
-                kept &= measured(url, given.jobs, folder / "history.json", master)
+                kept &= measured(url, given.jobs, folder / "history.json", master, given.largest)
             finally:
                 server.cleanup()
     return 0 if kept else 1

@@ -2,7 +2,7 @@
 
 import json
 import re
-from datetime import timedelta
+from datetime import date, timedelta
 from pathlib import Path
 from urllib.parse import urlencode
 
@@ -144,11 +144,8 @@ def test_a_campaign_is_made_started_and_scheduled_by_forms(window: Watched, serv
     page.locator("#campaign").get_by_role("button", name="Schedule").click()
     expect(page.locator("#schedules tbody tr")).to_have_count(2)
     once = service.client.get("/api/v1/schedules").json()["items"][0]
-    assert (once["once"], once["campaign"], once["next_at"][11:16]) == (
-        True,
-        "short",
-        "22:30",
-    )
+    assert (once["at"], once["campaign"], once["cron"]) == (once["next_at"], "short", None)
+    assert once["at"][:10] in (tomorrow[:10], (now() + timedelta(days=2)).date().isoformat())
     page.locator('td[data-campaign="short"]').get_by_role("button", name="Start").click()
     page.get_by_role("button", name="Start the campaign").click()
     page.wait_for_url(re.compile("/campaign-runs/"))
@@ -224,6 +221,33 @@ def test_a_batch_takes_what_the_last_search_shows_and_a_job_by_its_number(
     batch = page.locator("#batches tr[data-batch]").first
     expect(batch).to_contain_text(f"{count} of {count}", timeout=100_000)
     expect(batch).to_contain_text(f"Job {calibrated}")
+
+
+def test_jobs_and_recordings_of_the_last_days_are_found_in_one_go(
+    window: Watched, service: BenchProcess, calibrated: str
+) -> None:
+    """The period fills both days in, and a day that is typed says so. Each job of a recording comes with the list."""
+    asked: list[str] = []
+    window.context.on("request", lambda request: asked.append(request.url))
+    for path, rows in (("/jobs", "#found tbody tr"), ("/recordings", "#found tbody tr")):
+        page = window.open(path)
+        expect(page.locator(rows).first).to_be_visible()
+        page.get_by_label("Period").select_option(label="last 7 days")
+        week = (now() - timedelta(days=7)).date()
+        assert abs((date.fromisoformat(page.locator("[name=since]").input_value()) - week).days) <= 1
+        expect(page.locator(rows).first).to_be_visible()
+        page.locator("[name=since]").fill("2020-01-01")
+        page.locator("[name=until]").fill("2020-01-31")
+        page.get_by_role("button", name="Search").click()
+        expect(page.get_by_role("status").filter(has_text="Nothing found.")).to_be_visible()
+        assert page.get_by_label("Period").input_value() == "other"
+        page.get_by_label("Period").select_option(label="today")
+        expect(page.locator(rows).first).to_be_visible()
+    number = service.client.get(f"/api/v1/jobs/{calibrated}").json()["number"]
+    expect(page.locator(rows).filter(has_text=f"#{number} Calibration").first).to_be_visible()
+    assert not [url for url in asked if "/api/v1/jobs/" in url], "a job was asked for by itself"
+    page = window.open(f"/jobs?since={(now().astimezone() - timedelta(days=7)).date()}")
+    expect(page.get_by_label("Period")).to_have_value(re.compile("7|other"))  # at midnight the browser's day is another
 
 
 def test_batches_are_followed_past_failed_looks_and_their_button_keeps_the_focus(

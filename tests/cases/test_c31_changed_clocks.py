@@ -67,7 +67,7 @@ def test_a_service_that_comes_back_in_the_second_of_two_equal_hours_starts_once(
     stores, database = open_stores(f"sqlite:///{tmp_path}/b.sqlite")
     of = campaign({})
     scheduler = Scheduler(stores, lambda _: of, lambda request: new_run(of, unit=request.unit))
-    made = scheduler.add(ScheduleRequest("30 3 * * *", "Europe/Kyiv", "trial", "U-1"))
+    made = scheduler.add(ScheduleRequest("trial", "U-1", "30 3 * * *", "Europe/Kyiv"))
     first = datetime(2026, 10, 25, 0, 30, tzinfo=UTC)
     assert stores.campaigns.save_schedule(replace(made, next_at=first), made.next_at, None)
     for minutes in range(35, 75, 5):  # the second 03:05 … 03:40

@@ -80,6 +80,9 @@ class Watch:
     def supervisor(self) -> ProcessIdentity | None:
         return None
 
+    def silent_supervisor(self) -> ProcessIdentity | None:
+        return None
+
 
 class Lease:
     def __init__(self) -> None:

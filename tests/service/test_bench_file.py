@@ -1,9 +1,11 @@
 """Bench files and unit files: what is read, and that a mistake is answered with file, line and field."""
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from bench_service.bench.directory import certificates_due
 from bench_service.drivers.bench_file.description import described
 from bench_service.drivers.bench_file.document import read_bench_file
 from bench_service.drivers.bench_file.lines import line_of
@@ -143,6 +145,11 @@ def test_a_certificate_is_overdue_after_its_day(tmp_path: Path, day: str, overdu
     assert found.overdue(day) == (
         ("the certificate AT-117 of the turntable has expired: it was valid until 2027-03-02",) if overdue else ()
     )
+    soon = "the certificate AT-117 of the turntable expires soon: it is valid until 2027-03-02"
+    assert found.due_between(day, "2027-03-31") == (() if overdue else (soon,))
+    at = datetime.fromisoformat(f"{day}T23:59:59+00:00")
+    assert certificates_due(found, at) == (found.overdue(day) or (soon,))
+    assert certificates_due(found, at - timedelta(days=40)) == ()
 
 
 def test_a_time_factor_belongs_to_served_simulators_alone(tmp_path: Path) -> None:

@@ -101,3 +101,19 @@ def test_a_schedule_is_kept_by_the_service(client: Client, plain: str) -> None:
     assert "* * * * *" in client.http.get("/campaigns").text
     assert client.http.delete(address).status_code == 204
     assert client.http.get(address).status_code == 404
+
+
+def test_a_schedule_of_one_moment_needs_its_zone_and_is_shown_with_its_date(client: Client, plain: str) -> None:
+    body = {"campaign": plain, "unit": "SIM-0001"}
+    refused = client.http.post("/api/v1/schedules", json={**body, "at": "2071-01-01T22:30:00"})
+    assert (refused.status_code, "at" in refused.text, "timezone" in refused.text) == (422, True, True)
+    refused = client.http.post(
+        "/api/v1/schedules", json={**body, "cron": "0 1 * * *", "time_zone": "UTC", "once": True}
+    )
+    assert refused.status_code == 422
+    made = client.http.post("/api/v1/schedules", json={**body, "at": "2071-01-01T22:30:00+02:00"})
+    assert made.status_code == 201, made.text
+    view = made.json()
+    assert (view["at"], view["next_at"], view["cron"]) == (view["at"], "2071-01-01T20:30:00Z", None)
+    assert "2071-01-01T20:30" in client.http.get("/campaigns").text
+    assert client.http.delete(made.headers["Location"]).status_code == 204

@@ -4,6 +4,8 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import httpx
 import numpy as np
@@ -11,7 +13,12 @@ import pytest
 
 from bench_service.cli.asking.client import connect
 from bench_service.cli.commands import run_command_line
+from bench_service.evidence.analyses import AnalysisService
+from bench_service.model.records import RecordingState, StoredRecording
 from bench_service.settings import Settings
+from bench_service.wall_clock import now
+from procedures.core.recording import RecordingInfo, Station
+from procedures.core.table_angles import TableAngles
 from tests.service.client import Client
 
 GYRO = {"name": "gyro_x", "column": "x", "quantity": "angular_rate", "unit": "deg/s"}
@@ -142,3 +149,41 @@ def test_no_other_method_takes_a_gap_for_a_number(sqlite_client: Client, method:
     assert answer.status_code == 422, answer.text
     said = answer.json()["detail"]
     assert any(word in said for word in ("1500", "not numbers", "NaN", "missing", "finite")), said
+
+
+def test_texts_of_a_result_name_the_recordings_by_their_files_or_job_and_station(sqlite_client: Client) -> None:
+    """They said "recording 1", and of two jobs "position 1" twice."""
+    rng = np.random.default_rng(18)
+    description = {
+        "unit": "NAMED-1",
+        "rate_hz": 10.0,
+        "channels": [{"name": "gyro_x", "quantity": "angular_rate", "unit": "rad/s"}],
+    }
+    data = "gyro_x\n" + "\n".join(f"{value:.9f}" for value in rng.normal(0.0, 1e-4, 1500))
+    other = "gyro_x\n" + "\n".join(f"{value:.9f}" for value in rng.normal(0.0, 1e-4, 1500))
+    ids = [sqlite_client.import_files(description, each.encode()).json()["id"] for each in (data, other)]
+    alone = sqlite_client.analyse("noise_analysis", recordings=ids[:1])
+    assert alone.status_code == 201, alone.text
+    assert [launch["label"] for launch in alone.json()["document"]["launches"]] == ["file0.csv"]
+    both = sqlite_client.analyse("noise_analysis", recordings=ids)
+    labels = [launch["label"] for launch in both.json()["document"]["launches"]]
+    assert labels == [f"file0.csv ({one[:8]})" for one in ids]
+    page = sqlite_client.http.get(both.json()["page"]).text
+    assert (labels[0] in page, "recording 1" in page) == (True, False)
+
+
+def test_recordings_of_several_jobs_are_named_by_job_and_station() -> None:
+    station = Station(0, "position 1", TableAngles(0.0, 0.0, 0.0), 20.5, 1.0, 60.0)
+    infos = [RecordingInfo(f"r{number}", "U-1", (), 100.0, 10, station=station) for number in range(3)]
+    jobs = ("a", "b", None)
+    stored = {i.id: StoredRecording(i, RecordingState.COMPLETE, now(), job) for i, job in zip(infos, jobs, strict=True)}
+    loaded: dict[str, str] = {}
+    recordings = SimpleNamespace(get=stored.__getitem__, load=loaded.__setitem__)
+    job_of = lambda job_id: SimpleNamespace(number={"a": 7, "b": 12}[job_id])  # noqa: E731
+    service = AnalysisService(
+        cast("Any", SimpleNamespace(recordings=recordings)), cast("Any", None), cast("Any", job_of), ""
+    )
+    service._complete(["r0", "r1", "r2"])
+    assert loaded == {"r0": "job #7, position 1", "r1": "job #12, position 1", "r2": ""}
+    service._complete(["r0"])
+    assert loaded["r0"] == "", "of one job alone the station says enough"

@@ -20,8 +20,11 @@ from bench_service.notifications.channels import SIGNATURE
 from bench_service.notifications.messages import Message
 from bench_service.notifications.outbox import FIRST_PAUSE, OLDEST, Outbox
 from bench_service.notifications.targets import Mail, Webhook, read_targets
+from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
+from procedures.bench import BenchDescription
+from tests.kit.supervised_bench import GONE
 from tests.service.client import FAST, Client
 
 AT = datetime(2026, 3, 1, 12, tzinfo=UTC)
@@ -285,7 +288,12 @@ def until(true: Callable[[], bool]) -> None:
         pause(0.05)
 
 
-def test_a_bench_tells_of_verdicts_prompts_failed_nights_and_stops(tmp_path: Path, hook: _Hook) -> None:
+def test_a_bench_tells_of_verdicts_prompts_failed_nights_stops_and_a_silent_supervisor(
+    tmp_path: Path, hook: _Hook, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(HostFiles, "silent_supervisor", lambda _: GONE.process)
+    due = "the certificate AT-1 of the turntable expires soon: it is valid until 2031-01-02"
+    monkeypatch.setattr(BenchDescription, "due_between", lambda *_: (due,))
     file = tmp_path / "notify.toml"
     file.write_text(f'[[target]]\nname = "chat"\nkind = "webhook"\nurl = "{hook.url}"\n')
     url = f"sqlite:///{tmp_path / 'bench.sqlite'}"
@@ -295,6 +303,10 @@ def test_a_bench_tells_of_verdicts_prompts_failed_nights_and_stops(tmp_path: Pat
         legs = [{"target_c": target, "ramp_c_min": 5.0, "least_s": 600.0} for target in (30.0, 25.0, 20.0)]
         asks = client.submit("thermal_cycle", parameters={"legs": legs, "power_off_s": 60.0})
         until(lambda: "prompt" in kinds(hook))
+        silent = [got["text"] for got in hook.got if got["title"] == "sim: its supervisor is silent"]
+        assert len(silent) == 1
+        assert f'<p class="warning">T{due[1:]}.</p>' in http.get("/").text
+        assert silent[0].startswith("The supervisor, process 1 on nowhere, gives no heartbeat")
         http.post(f"/api/v1/jobs/{asks['id']}/cancel")
         client.wait(asks["id"])
         steps = [{"name": "verify", "procedure": "calibration_12_orientations", "parameters": FAST}]
@@ -304,7 +316,7 @@ def test_a_bench_tells_of_verdicts_prompts_failed_nights_and_stops(tmp_path: Pat
         stop = http.post("/api/v1/benches/sim/stop", json={"reason": "smoke", "by": "Olena"}).json()["stop"]
         until(lambda: "stop" in kinds(hook))
     told = {got["kind"]: got for got in hook.got}
-    first = hook.got[0]
+    first = next(got for got in hook.got if got["kind"] == "verdict")
     assert first["title"] == f"sim: {job['verdict'].upper()} {job['procedure']} on SIM-0001"
     assert first["page"] == f"/jobs/{job['id']}"
     assert told["prompt"]["page"] == f"/jobs/{asks['id']}"
@@ -312,4 +324,5 @@ def test_a_bench_tells_of_verdicts_prompts_failed_nights_and_stops(tmp_path: Pat
     assert "limit" in told["campaign"]["text"] or "=" in told["campaign"]["text"]
     assert told["stop"]["key"] == f"stop-{stop}"
     assert "Olena: smoke" in told["stop"]["text"]
-    assert sorted(kinds(hook)) == ["campaign", "prompt", "stop", "verdict", "verdict"]
+    assert sorted(kinds(hook)) == ["campaign", "certificate", "prompt", "stop", "trouble", "verdict", "verdict"]
+    assert told["certificate"]["title"] == f"sim: {due}"

@@ -1,10 +1,19 @@
 """The pages: they answer, are whole, and show progress, verdicts, plots and lineage."""
 
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bench_service.wall_clock import pause
+from bench_service.cli.asking.client import connect
+from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.jobs.reservation import Reservation, Reserved
+from bench_service.persistence import open_stores
+from bench_service.settings import Settings
+from bench_service.wall_clock import new_id, now, pause
+from procedures.core.unit import Unit
 from tests.service.client import Client
 from tests.service.page import page
 
@@ -122,3 +131,30 @@ def test_an_address_that_is_markup_comes_back_as_data(sqlite_client: Client) -> 
         answer = sqlite_client.http.get(path)
         assert answer.status_code == 404
         assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_the_first_page_lists_some_units_and_says_how_many_there_are_and_who_has_the_bench(tmp_path: Path) -> None:
+    """It read and drew a thousand units; those that a bench has stand first."""
+    url = f"sqlite:///{tmp_path / 'bench.sqlite'}"
+    stores, database = open_stores(url)
+    stores.benches.put_bench(SimulatedDriver("sim").description, ["SIM-0001"])
+    unit = Unit("A", 200.0, ())
+    for serial in (*(f"A-{number:02}" for number in range(25)), "SIM-0001"):
+        stores.units.put_unit(replace(unit, serial=serial))
+    assert stores.units.serials()[-1] == "SIM-0001"
+    begun = now()
+    for name, kind in (("SIM-0001", Reserved.UNIT), ("sim", Reserved.BENCH)):
+        held = Reservation(new_id(), kind, name, f"<b>Olena</b> {name}", begun, begun + timedelta(hours=2), "drift")
+        stores.reservations.add(held)
+    assert [one.serial for one in stores.units.units(["SIM-0001", "A-03", "none"])] == ["A-03", "SIM-0001"]
+    database.dispose()
+    with connect(Settings(database_url=url), None, drive=False) as http:
+        home = http.get("/").text
+        assert "Reserved for &lt;b&gt;Olena&lt;/b&gt; sim until" in home
+        reserved = http.get("/api/v1/benches/sim").json()["reserved"]
+        assert (reserved["holder"], reserved["note"]) == ("<b>Olena</b> sim", "drift")
+        units = home[home.index("<h2>Units") : home.index("<h2>Latest jobs")]
+        assert units.count("<tr><td>") == 20
+        assert units.index("SIM-0001") < units.index("A-00")
+        assert '<a href="/units">All units: 26</a>' in units
+        assert http.get("/units").text.count("<tr><td>") == 26

@@ -99,6 +99,18 @@ def test_a_stop_by_a_bench_file_that_cannot_be_read_stops_no_other_bench(
     assert capsys.readouterr().err.rstrip().endswith("are: none")
 
 
+@pytest.mark.parametrize("seconds", ["nan", "inf", "-inf", "-1", "1e9", "soon"])
+def test_a_time_to_wait_that_is_none_is_refused_and_said_to_stop_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], seconds: str
+) -> None:
+    """No comparison holds for nan: the command waited for ever, and never said that the bench is not safe."""
+    own_of(tmp_path, "sim")
+    assert stop_command((f"--wait={seconds}",), {"BENCH_DEVICE_FOLDER": str(tmp_path)}) == REFUSED
+    said = capsys.readouterr().err
+    assert f"--wait: {seconds}: seconds from 0 to 86400 are expected; NOTHING IS STOPPED" in said
+    assert StopChannel(tmp_path, "sim").standing() == ()
+
+
 def no_descriptor(*_: object) -> Any:
     raise OSError(EMFILE, "no descriptor is left")
 

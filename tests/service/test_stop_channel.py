@@ -62,6 +62,47 @@ def test_words_asked_at_once_are_all_kept_and_one_too_many_leaves_the_bench_stop
     assert len(channel.standing()) == WORDS
 
 
+def test_a_stop_beyond_the_room_of_the_file_is_answered_and_stands_after_the_others(channel: StopChannel) -> None:
+    """The 17th was dropped: nobody answered it, and it did not stand once the others were released."""
+    words = [StopWord(f"reason {number}", "somebody", "http") for number in range(WORDS)]
+    for word in words:
+        channel.ask(word)
+    worker, asking = other(channel), other(channel)
+    listening = worker.listen(WORKER)
+    assert listening is not None
+    late = [StopWord(f"late {number}", "Olena", "command") for number in range(WORDS)]
+    for word in late:
+        assert asking.ask(word)
+        worker.receive(listening)
+    listening.close()
+    assert {asking.state(word.id) for word in late} == {"asked"}
+    ids = frozenset(word.id for word in worker.standing())
+    assert ids == {word.id for word in (*words, *late)}
+    worker.answer(WORKER, StopAnswer("the worker", ids))
+    assert {asking.state(word.id) for word in late} == {"seen"}
+    worker.answer(WORKER, StopAnswer("the worker", ids, ids))
+    assert {asking.state(word.id) for word in late} == {"safe"}
+    worker.clear(word.id for word in words)
+    assert {word.id for word in worker.standing()} == {word.id for word in late}
+
+
+def test_a_stop_that_no_process_keeps_is_as_far_as_the_least_of_those_that_stand(channel: StopChannel) -> None:
+    words = [StopWord(f"reason {number}", "somebody", "http") for number in range(WORDS)]
+    for word in words:
+        channel.ask(word)
+    assert channel.ask(one_more := StopWord("one more", "Olena", "command"))
+    first, ids = words[0].id, frozenset(word.id for word in words)
+    for seen, safe, state in (
+        (ids - {first}, (), "asked"),
+        (ids, (), "seen"),
+        (ids, {first}, "seen"),
+        (ids, ids, "safe"),
+    ):
+        other(channel).answer(WORKER, StopAnswer("the worker", frozenset(seen), frozenset(safe)))
+        assert channel.state(one_more.id) == state
+    assert channel.state("another") == "asked"
+
+
 def test_a_torn_record_stops_the_bench_until_it_is_released(channel: StopChannel) -> None:
     channel.ask(StopWord("a test", "somebody", "http"))
     with (channel._folder / "bench-sim.stop").open("r+b") as file:

@@ -73,6 +73,9 @@ def test_the_supervisor_is_given_that_time(tmp_path: Path, monkeypatch: pytest.M
 
         def run(self, *_: object) -> None: ...
 
+        def goes_on(self) -> bool:
+            return True
+
     for name in ("set_up", "protect", "ending_on_signals"):
         monkeypatch.setattr(supervising, name, lambda *_: None)
     monkeypatch.setattr(supervising, "Supervisor", Watching)

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from bench_service.campaigns.stores import Stores
 from bench_service.model.errors import NotFound
-from bench_service.model.job import Job
+from bench_service.model.job import Job, JobHeading
 from bench_service.persistence import open_stores
 from tests.storage.migrating import migrated
 
@@ -22,6 +22,8 @@ def test_rivals_get_numbers_of_their_own(stores: Stores, new_job: Callable[..., 
     assert stores.jobs.id_of(made[5].number) == made[5].id
     with pytest.raises(NotFound, match="#25"):
         stores.jobs.id_of(25)
+    headings = stores.jobs.headings([made[5].id, "none"])
+    assert headings == {made[5].id: JobHeading(made[5].number, "static_run")}
     assert stores.jobs.numbers([job.id for job in made]) == {job.id: job.number for job in made}
 
 

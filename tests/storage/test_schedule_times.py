@@ -94,5 +94,5 @@ def test_what_is_no_time_zone_is_refused(zone: str) -> None:
 )
 def test_of_many_missed_starts_the_latest_counts(cron: str, planned: str, at: str, latest: str) -> None:
     moments = [datetime.fromisoformat(text).replace(tzinfo=UTC) for text in (planned, at, latest)]
-    schedule = Schedule("s", cron, "UTC", "c", "u", moments[0], next_at=moments[0])
+    schedule = Schedule("s", "c", "u", moments[0], cron, "UTC", next_at=moments[0])
     assert latest_due(schedule, moments[1]) == moments[2]

@@ -3,6 +3,8 @@
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from threading import Thread
+from typing import Any
+from zoneinfo import ZoneInfo
 
 import pytest
 
@@ -10,12 +12,14 @@ from bench_service.campaigns.run import CampaignRun, RunRequest
 from bench_service.campaigns.schedule import Missed, Overlap, Schedule, brought_back
 from bench_service.campaigns.scheduler import Scheduler, ScheduleRequest
 from bench_service.campaigns.stores import Stores
-from bench_service.model.errors import NotFound, NotMounted
+from bench_service.model.errors import IllegalTransition, NotFound, NotMounted
 from bench_service.model.job import JobState
+from bench_service.wall_clock import now
+from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
 from tests.storage.campaigns import campaign, new_run
 
-NIGHTLY = ScheduleRequest("0 1 * * *", "Europe/Kyiv", "trial", "U-1")
+NIGHTLY = ScheduleRequest("trial", "U-1", "0 1 * * *", "Europe/Kyiv")
 DUE = datetime(2031, 7, 1, 22, 0, tzinfo=UTC)  # 01:00 in Kyiv, in summer time
 OF = campaign({})
 
@@ -63,13 +67,64 @@ def test_a_start_on_time(scheduler: Scheduler, stores: Stores) -> None:
     assert (after.last_run, after.last_outcome) == (run.id, "started")
 
 
-def test_a_start_once_is_the_only_one(scheduler: Scheduler, stores: Stores) -> None:
-    schedule = due(stores, scheduler, once=True)
-    assert scheduler.fire(schedule, DUE + timedelta(seconds=2))
+@pytest.mark.parametrize("years", [0, 3])
+def test_a_start_at_a_moment_is_the_only_one_however_far_ahead(
+    scheduler: Scheduler, stores: Stores, years: int
+) -> None:
+    """As a cron line without a year it came in the first year, and again where the schedule was switched on again."""
+    at = (now() + timedelta(days=366 * years + 2)).astimezone(ZoneInfo("Asia/Tokyo"))
+    schedule = scheduler.add(ScheduleRequest("trial", "U-1", at=at))
+    assert (schedule.next_at, schedule.at, schedule.cron) == (at.astimezone(UTC), at.astimezone(UTC), None)
+    assert stores.campaigns.due_schedules(at - timedelta(seconds=1)) == ()
+    assert scheduler.enable(schedule.id, False).next_at is None
+    schedule = scheduler.enable(schedule.id, True)
+    assert schedule.next_at == at
+    assert scheduler.fire(schedule, at + timedelta(seconds=2))
     after = scheduler.get(schedule.id)
-    assert (after.enabled, after.next_at, after.last_at, after.last_outcome) == (False, None, DUE, "started")
-    assert stores.campaigns.due_schedules(DUE + timedelta(days=800)) == ()
+    assert (after.enabled, after.next_at, after.last_at, after.last_outcome) == (False, None, at, "started")
+    with pytest.raises(IllegalTransition, match="one start alone"):
+        scheduler.enable(schedule.id, True)
+    assert stores.campaigns.due_schedules(at + timedelta(days=800)) == ()
     assert len(runs(stores)) == 1
+
+
+def test_a_start_at_a_moment_that_passed_while_it_was_off_is_not_made_up(scheduler: Scheduler, stores: Stores) -> None:
+    schedule = scheduler.add(ScheduleRequest("trial", "U-1", at=now() + timedelta(days=1), enabled=False))
+    past = replace(schedule, at=now() - timedelta(minutes=1))
+    assert stores.campaigns.save_schedule(past, None, None)
+    with pytest.raises(IllegalTransition, match="add another schedule"):
+        scheduler.enable(schedule.id, True)
+
+
+@pytest.mark.parametrize("missed", list(Missed))
+def test_a_missed_moment_is_made_up_or_left_out_and_the_schedule_is_over(
+    scheduler: Scheduler, stores: Stores, missed: Missed
+) -> None:
+    at = now() + timedelta(days=1)
+    schedule = scheduler.add(ScheduleRequest("trial", "U-1", at=at, missed=missed))
+    assert scheduler.fire(schedule, at + timedelta(days=400))
+    assert [run.planned_at for run in runs(stores)] == ([at] if missed is Missed.RUN_ONCE else [])
+    assert (scheduler.get(schedule.id).enabled, scheduler.get(schedule.id).next_at) == (False, None)
+
+
+@pytest.mark.parametrize(
+    ("times", "field"),
+    [
+        ({}, "cron"),
+        ({"time_zone": "UTC"}, "cron"),
+        ({"cron": "0 1 * * *"}, "time_zone"),
+        ({"cron": "0 1 * * *", "time_zone": "UTC", "at": DUE}, "at"),
+        ({"time_zone": "UTC", "at": DUE}, "at"),
+        ({"at": datetime(2020, 1, 1, tzinfo=UTC)}, "at"),
+        ({"at": datetime(9999, 12, 31, 23, tzinfo=UTC)}, "at"),
+    ],
+)
+def test_times_of_neither_kind_are_refused_by_the_field(
+    scheduler: Scheduler, times: dict[str, Any], field: str
+) -> None:
+    with pytest.raises(BadParameter) as refused:
+        scheduler.add(ScheduleRequest("trial", "U-1", **times))
+    assert refused.value.field == field
 
 
 @pytest.mark.parametrize("nights", [0, 3])
@@ -175,7 +230,7 @@ def test_a_start_that_is_brought_back_says_why_and_a_right_one_stays(scheduler: 
 
 
 def test_a_clock_put_right_by_minutes_repeats_no_start() -> None:
-    every_minute = Schedule("id", "* * * * *", "UTC", "trial", "U-1", DUE)
+    every_minute = Schedule("id", "trial", "U-1", DUE, "* * * * *", "UTC")
     shortly = replace(every_minute, last_at=DUE + timedelta(minutes=10), next_at=DUE + timedelta(minutes=11))
     assert brought_back(shortly, DUE) is None
     far = replace(every_minute, last_at=DUE + timedelta(days=1), next_at=DUE + timedelta(days=1, minutes=1))

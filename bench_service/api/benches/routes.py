@@ -9,6 +9,7 @@ from bench_service.api.benches.schemas import (
     QueueView,
     ReleaseRequest,
     Releasing,
+    ReservedView,
     SafetyView,
     StopPage,
     Stopping,
@@ -27,6 +28,8 @@ from bench_service.api.http.dependencies import (
     Service,
 )
 from bench_service.api.http.errors import problems
+from bench_service.jobs.reservation import reservation_of_bench
+from bench_service.mapping import copied
 from bench_service.model.records import reasons_of
 from bench_service.routing import Routes
 from bench_service.service import BenchService
@@ -56,7 +59,14 @@ def view_of(service: BenchService, bench_id: str) -> BenchView:
         safety=SafetyView.of(service.safety.known(bench_id)),
         driven_by=service.benches.holder(bench_id),
         queued=service.stores.queue.lengths().get(bench_id, 0),
+        reserved=_reserved(service, bench_id),
     )
+
+
+def _reserved(service: BenchService, bench_id: str) -> ReservedView | None:
+    """The reservation that a bench is under now; None where it is under none."""
+    kept = reservation_of_bench(service.stores.reservations, bench_id, now())
+    return None if kept is None else copied(ReservedView, kept)
 
 
 @router.get("", responses=problems())

@@ -111,6 +111,9 @@ class SafetyView(BaseModel):
     supervisor: str | None = Field(
         description="The process of this host that makes the bench safe if the worker cannot"
     )
+    silent_supervisor: str | None = Field(
+        description="A supervisor of this host without a heartbeat, which hangs or is suspended: nobody watches"
+    )
 
     @classmethod
     def of(cls, safety: Safety) -> "SafetyView":
@@ -121,7 +124,16 @@ class SafetyView(BaseModel):
             devices=DevicesView.of(safety.devices),
             worker=None if safety.worker is None else str(safety.worker),
             supervisor=None if safety.supervisor is None else str(safety.supervisor),
+            silent_supervisor=None if safety.silent_supervisor is None else str(safety.silent_supervisor),
         )
+
+
+class ReservedView(BaseModel):
+    """The reservation that a bench is under: who has it, and until when."""
+
+    holder: str
+    until: datetime
+    note: str
 
 
 class BenchView(BaseModel):
@@ -140,6 +152,7 @@ class BenchView(BaseModel):
     safety: SafetyView
     driven_by: str | None = Field(description="Worker process that drives it now; null: none, its jobs wait")
     queued: int = Field(description="How many jobs wait in its queue")
+    reserved: ReservedView | None = Field(description="Its reservation now; null: anybody's jobs may start")
 
 
 class QueueEntryView(BaseModel):

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from fastapi import Response
-from pydantic import Field
+from pydantic import AwareDatetime, Field
 
 from bench_service.api.access.teams import TeamOfSchedule
 from bench_service.api.campaigns.schemas import SchedulePage, ScheduleView
@@ -20,16 +20,24 @@ OF_A_SCHEDULE = ("read_schedule", "change_schedule", "remove_schedule")
 
 
 class ScheduleSubmission(Request):
-    """Request to run a campaign on a unit at repeated times, or once."""
+    """Request to run a campaign on a unit at repeated times (`cron` with `time_zone`), or exactly once (`at`)."""
 
-    cron: str = Field(
+    cron: str | None = Field(
+        None,
         min_length=1,
         max_length=200,
         pattern=r"^[^\x00-\x1f]+$",
         description="minute, hour, day of month, month, day of week",
     )
-    time_zone: str = Field(
-        min_length=1, max_length=100, pattern=r"^[^\x00-\x1f]+$", description="IANA name, such as Europe/Kyiv"
+    time_zone: str | None = Field(
+        None,
+        min_length=1,
+        max_length=100,
+        pattern=r"^[^\x00-\x1f]+$",
+        description="IANA name of the expression's zone, such as Europe/Kyiv",
+    )
+    at: AwareDatetime | None = Field(
+        None, description="The only start, with its zone, in place of cron and time_zone; then the schedule is off"
     )
     campaign: str = NAME
     unit: str = NAME
@@ -42,7 +50,6 @@ class ScheduleSubmission(Request):
         300.0, ge=1.0, le=604_800.0, allow_inf_nan=False, description="Delay after which a start counts as missed [s]"
     )
     overlap: Overlap = Field(Overlap.SKIP, description="Start while the previous run is open: skip or queue")
-    once: bool = Field(False, description="Whether the next start is the only one: then it is switched off")
     enabled: bool = True
     labels: Labels = Field(default_factory=Labels, max_length=20)
 
@@ -82,9 +89,9 @@ def read_schedule(schedule_id: str, service: Service) -> ScheduleView:
     return ScheduleView.of(service.campaigns.schedules.get(schedule_id))
 
 
-@router.patch("/{schedule_id}", responses=problems(404, 413, 507), dependencies=[TeamOfSchedule])
+@router.patch("/{schedule_id}", responses=problems(404, 409, 413, 507), dependencies=[TeamOfSchedule])
 def change_schedule(schedule_id: str, body: ScheduleChange, service: Service) -> ScheduleView:
-    """Switch a schedule off or on; starts that pass while it is off are not made up."""
+    """Switch a schedule off or on; starts that pass while it is off are not made up, a single one is not repeated."""
     return ScheduleView.of(service.campaigns.schedules.enable(schedule_id, body.enabled))
 
 

@@ -144,8 +144,9 @@ class ScheduleView(BaseModel):
     """A schedule: the times at which a campaign starts by itself."""
 
     id: str
-    cron: str
-    time_zone: str
+    cron: str | None = Field(description="Minute, hour, day of month, month, day of week; null for a single start")
+    time_zone: str | None
+    at: datetime | None = Field(description="The only start, UTC; null for repeated ones")
     campaign: str
     unit: str
     bench: str | None
@@ -153,7 +154,6 @@ class ScheduleView(BaseModel):
     missed: Missed
     start_within_s: float
     overlap: Overlap
-    once: bool = Field(description="Whether the next start is the only one")
     labels: Labels
     team: str = Field(description="Team whose members change it and act on its runs; empty: everybody")
     created_at: datetime

@@ -4,8 +4,8 @@ A file of fixed length (`bench-<id>.stop`) holds the stop requests and the answe
 records are written in place. Each of the two also has a Unix datagram socket, which wakes it, and which carries the
 request where the file cannot be written. None of this needs a free byte, a free inode, a database or a network.
 
-A stop request (`StopWord`) passes through three states: asked (it is in the channel), seen (by the driving process, or
-by the supervisor), safe (the devices report it). Light on purpose: `bench stop` imports this and little else.
+A stop request (`StopWord`) is asked (it is in the channel), then seen (by the driving process, or by the supervisor),
+then safe (the devices report it). Light on purpose: `bench stop` imports this and little else.
 """
 
 import fcntl
@@ -13,6 +13,7 @@ import json
 import logging
 import os
 import socket
+from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -34,7 +35,7 @@ from bench_service.bench.stop.word import DAMAGED, StopAnswer, StopWord
 from bench_service.wall_clock import monotonic_s, pause
 
 WORDS = 16
-"""Maximum number of stops that a bench has at once; further ones change nothing: the bench is stopped."""
+"""Maximum number of stops in the file; worker and supervisor keep as many more in memory, and leave out the rest."""
 WORKER, SUPERVISOR = 0, 1
 """Roles that answer a stop; each is also the number of its answer's record."""
 _FIRST = 2
@@ -57,6 +58,8 @@ class StopChannel:
         self._file: int | None = None
         self._came: dict[str, StopWord] = {}
         """Stop requests that came by the socket and could not be written into the file."""
+        self._not_kept: deque[str] = deque(maxlen=WORDS)
+        """Ids of stop requests by this process for which the file has no room."""
         self._last: tuple[bytes, tuple[StopWord, ...]] = (b"", ())
         self._answers = [StopAnswer(), StopAnswer()]
         self._mutex = Lock()
@@ -80,7 +83,9 @@ class StopChannel:
         """Enter a stop request; return True where worker or supervisor will see it. Raises nothing."""
         written = False
         with suppress(OSError):
-            written = self._write(word)
+            if not self._write(word):
+                self._not_kept.append(word.id)
+            written = True  # also without room: only a reason is lost, the bench is stopped
         sent = self._send({"stop": word.document()})
         return written or sent
 
@@ -135,7 +140,7 @@ class StopChannel:
         if answer == self._answers[role]:
             return
         record = encoded({"by": answer.by, "seen": sorted(answer.seen), "safe": sorted(answer.safe)})
-        assert record is not None, "at most WORDS ids of 36 characters, twice"
+        assert record is not None, "at most 2 * WORDS ids of 36 characters, twice"
         try:
             write_record(self._open(), role, record)
         except OSError as error:
@@ -154,11 +159,14 @@ class StopChannel:
         return StopAnswer(found["by"], frozenset(found["seen"]), frozenset(found["safe"]))
 
     def state(self, word_id: str) -> str:
-        """Return the state of a stop request by the answers to it: "asked", "seen" or "safe"."""
+        """Return the state of a stop request by the answers to it: "asked", "seen" or "safe". One without a record is
+        as far as the least of those that stand.
+        """
         answers = [self.answered(role) for role in (WORKER, SUPERVISOR)]
-        if any(word_id in answer.safe for answer in answers):
-            return "safe"
-        return "seen" if any(word_id in answer.seen for answer in answers) else "asked"
+        safe, seen, ids = answers[0].safe | answers[1].safe, answers[0].seen | answers[1].seen, {word_id}
+        if word_id in self._not_kept and word_id not in seen:
+            ids = {word.id for word in self.standing()} or ids
+        return "safe" if ids <= safe else "seen" if ids <= seen | safe else "asked"
 
     def listen(self, role: int) -> socket.socket | None:
         """Open the receiving socket of `role`, worker or supervisor; None where none can be opened."""
@@ -199,7 +207,8 @@ class StopChannel:
                 return
         except OSError as error:
             log.warning("a stop of bench %s is kept in memory: %s", self.bench_id, error)
-        self._came[word.id] = word
+        if len(self._came) < WORDS:
+            self._came[word.id] = word
 
     def _open(self) -> int:
         if self._file is None:
@@ -235,7 +244,7 @@ class StopChannel:
         return (*words_in(page, leave_out_damaged=True), DAMAGED)
 
     def _write(self, word: StopWord) -> bool:
-        """Write into the first free record; where none is free only a reason is lost: the bench is stopped."""
+        """Write into the first free record; False where none is free."""
         with self._locked() as file:
             free: int | None = None
             for number in range(_FIRST, _FIRST + WORDS):
@@ -245,8 +254,10 @@ class StopChannel:
                 if found is None and free is None:
                     free = number
             if free is None:
-                log.warning("bench %s has %d stops already; one more by %s is not kept", self.bench_id, WORDS, word.by)
-                return True
+                log.warning(
+                    "the file of bench %s has %d stops; one more by %s has no room", self.bench_id, WORDS, word.by
+                )
+                return False
             record = encoded(word.document())
             assert record is not None, "its texts are cut"
             write_record(file, free, record)

@@ -7,8 +7,8 @@ from bench_service.cli.refusal import Refused
 from bench_service.wall_clock import now
 
 FORMS = "HH:MM (the next one), 'YYYY-MM-DD HH:MM', or with a zone 2026-12-01T22:30+02:00"
-FARTHEST = timedelta(days=300)
-"""Longest time ahead of a single start: it is stored as a day and a month, so a later one would come a year early."""
+FARTHEST = timedelta(days=50 * 366)
+"""Longest time ahead of a single start: a later one is a slip of the keyboard."""
 
 
 def start_time(text: str, zone: str | None = None) -> datetime:

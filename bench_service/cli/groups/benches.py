@@ -1,6 +1,7 @@
 """Commands of a bench: drive it, watch over it, stop and release it on its own host; its queue."""
 
 import json
+from argparse import ArgumentTypeError
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -58,16 +59,20 @@ def stop(
     context: typer.Context,
     bench: Annotated[str | None, typer.Option(help="Bench; default: the one in the settings")] = None,
     reason: Annotated[str, typer.Option(help="Reason, for the person who releases it")] = "stopped by an operator",
-    wait: Annotated[float, typer.Option(help="How long to wait until it is safe [s]")] = 15.0,
+    wait: Annotated[str, typer.Option(help="How long to wait until it is safe [s]")] = "15",
 ) -> int:
     """Stop a bench on its own host, also without API, database and free disk. Not the hardware emergency stop.
 
     Exit code: 0 safe, 1 asked for and not safe in time, 2 not asked for.
     """
-    from bench_service.cli.processes.stopping import stop_here
+    from bench_service.cli.processes.stopping import stop_here, waiting_s
 
     settings = of_bench(context.obj, bench)
-    return stop_here(settings.bench_id, settings.devices_in(), reason, wait, announce)
+    try:
+        wait_s = waiting_s(wait)
+    except ArgumentTypeError as error:
+        raise Refused(f"--wait {error}") from error
+    return stop_here(settings.bench_id, settings.devices_in(), reason, wait_s, announce)
 
 
 def check_file(

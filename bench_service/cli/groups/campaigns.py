@@ -1,7 +1,6 @@
 """``bench campaign`` and ``bench schedule``: acceptance in one command, with an exit code that a CI system can read."""
 
 import json
-from datetime import UTC
 from functools import partial
 from pathlib import Path
 from shlex import quote
@@ -181,8 +180,7 @@ def add_schedule(
 def _times(cron: str | None, time_zone: str | None, at: str | None) -> dict[str, Any]:
     """Times of a schedule by its options. Raises `Refused` where they are not one of the two kinds."""
     if at is not None and cron is None:
-        once = start_time(at, time_zone).astimezone(UTC)
-        return {"cron": f"{once.minute} {once.hour} {once.day} {once.month} *", "time_zone": "UTC", "once": True}
+        return {"at": start_time(at, time_zone).isoformat()}
     if cron is None or time_zone is None or at is not None:
         raise Refused("give --cron with --time-zone for repeated starts, or --at for one")
     return {"cron": cron, "time_zone": time_zone}

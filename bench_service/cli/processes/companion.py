@@ -3,6 +3,10 @@
 A companion that ended is started again, whatever ended it, at a pace that falls while it does not last. One that left
 the bench to another supervisor comes back only once the bench has been without supervisor for a while: long enough for
 the keeper of that other one to have started it again.
+
+A supervisor that lives and gives no heartbeat, because it hangs or is suspended, watches over nothing, and keeps the
+right to supervise. It is killed, whoever started it, before another one is started: so one that is continued later
+cannot act beside the new one.
 """
 
 import logging
@@ -15,6 +19,8 @@ from contextlib import contextmanager
 from math import inf
 from pathlib import Path
 
+from bench_service.bench.heartbeat import SUPERVISOR_KILLED_S, HeartbeatFile, SilenceCounter
+from bench_service.bench.processes import ProcessIdentity
 from bench_service.cli.processes.supervising import SUPERVISED_ALREADY
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings
@@ -38,25 +44,41 @@ log = logging.getLogger(__name__)
 class Companion:
     """Starts a supervisor as a process of its own and restarts it when it ends; that process outlives this one."""
 
-    def __init__(self, bench_id: str, spawn: Callable[[], Process], supervised: Callable[[], bool]) -> None:
-        """`spawn` starts a supervisor; `supervised`: returns whether any process supervises the bench now."""
+    def __init__(
+        self,
+        bench_id: str,
+        spawn: Callable[[], Process],
+        supervisor: Callable[[], ProcessIdentity | None],
+        silence: SilenceCounter,
+    ) -> None:
+        """`spawn` starts a supervisor; `supervisor`: returns the living process that has the right to supervise the
+        bench now; `silence` counts for how long it has given no heartbeat.
+        """
         self._bench_id = bench_id
         self._spawn = spawn
-        self._supervised = supervised
+        self._supervisor = supervisor
+        self._silence = silence
+        self._not_ended: ProcessIdentity | None = None
+        """A silent supervisor that this process may not kill."""
         self._process: Process | None = None
         self._started_s = -inf
         self._due_s = -inf
         self._pause_s = AGAIN_S
 
     def look(self, now_s: float) -> None:
-        """Check once whether the companion has ended, and start it if that is due."""
+        """Check once whether the companion has ended, or whichever supervisor there is is silent, and start it if that
+        is due.
+        """
+        supervisor = self._supervisor()
+        if self._silence.silent_s(supervisor, now_s) > SUPERVISOR_KILLED_S and supervisor is not None:
+            self._end_silent(supervisor)
         if self._process is not None:
             code = self._process.poll()
             if code is None:
                 return
             self._process = None
             self._ended(code, now_s)
-        if self._started_s > -inf and self._supervised():
+        if self._started_s > -inf and supervisor is not None:
             self._due_s = max(self._due_s, now_s + UNSUPERVISED_S)
         elif now_s >= self._due_s:
             self._start(now_s)
@@ -69,6 +91,19 @@ class Companion:
             self._process.wait(LEAVE_S)
         except subprocess.TimeoutExpired:
             self._process.returncode = 0  # no one waits for the process any more
+
+    def _end_silent(self, supervisor: ProcessIdentity) -> None:
+        """Kill a supervisor without a heartbeat: its right to supervise ends with it."""
+        what = (
+            f"the supervisor of bench {self._bench_id}, {supervisor}, gave no heartbeat for {SUPERVISOR_KILLED_S:g} s"
+        )
+        try:
+            if supervisor.kill():
+                log.warning("%s: killed, and another one is started", what)
+        except PermissionError:
+            if supervisor != self._not_ended:
+                log.error("%s, and belongs to another user: nobody watches over the bench until it is ended", what)
+            self._not_ended = supervisor
 
     def _start(self, now_s: float) -> None:
         self._started_s = now_s
@@ -101,7 +136,8 @@ def accompanied(settings: Settings, driving: Callable[[], bool]) -> Generator[No
     """
     over = threading.Event()
     files = HostFiles(settings.devices_in(), settings.bench_id)
-    companion = Companion(settings.bench_id, lambda: _spawn(settings), lambda: files.supervisor() is not None)
+    silence = SilenceCounter(HeartbeatFile(settings.devices_in(), settings.bench_id, of_supervisor=True))
+    companion = Companion(settings.bench_id, lambda: _spawn(settings), files.living_supervisor, silence)
 
     def keep() -> None:
         while not over.wait(LOOK_S):

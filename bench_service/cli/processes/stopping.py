@@ -28,6 +28,8 @@ HELP = (
     "Exit code: 0 safe, 1 asked for and not safe in time, 2 not asked for."
 )
 REASON, WAIT_S = "stopped by an operator", 15.0
+MOST_WAIT_S = 86_400.0
+"""Longest time that this command may be asked to wait [s]."""
 SAFE, NOT_SAFE, REFUSED = 0, 1, 2
 
 
@@ -82,7 +84,7 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
     parser = argparse.ArgumentParser(prog="bench stop", description=HELP)
     parser.add_argument("--bench", help="default: the one in the settings")
     parser.add_argument("--reason", default=REASON, help="for the person who releases it")
-    parser.add_argument("--wait", type=float, default=WAIT_S, metavar="SECONDS", help="until it is safe")
+    parser.add_argument("--wait", type=waiting_s, default=WAIT_S, metavar="SECONDS", help="until it is safe")
     try:
         given = parser.parse_args(list(arguments))
     except SystemExit as ended:
@@ -102,6 +104,17 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
         print(f"bench: --bench {bench}: small letters, digits, - and _ are expected", file=sys.stderr)
         return REFUSED
     return stop_here(bench, where, given.reason or REASON, given.wait, _say)
+
+
+def waiting_s(text: str) -> float:
+    """Return a time to wait [s] from its text. Raises `ArgumentTypeError` for one that never ends, or is over before
+    it begins.
+    """
+    with suppress(ValueError):
+        seconds = float(text)
+        if 0.0 <= seconds <= MOST_WAIT_S:  # neither holds for "nan"
+            return seconds
+    raise argparse.ArgumentTypeError(f"{text}: seconds from 0 to {MOST_WAIT_S:.0f} are expected; NOTHING IS STOPPED")
 
 
 def _own(environ: Mapping[str, str], folder: Path) -> str | None:

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from functools import partial
 
 from bench_service.bench.devices import BenchDevices
-from bench_service.bench.heartbeat import HeartbeatFile
+from bench_service.bench.heartbeat import Heartbeat, HeartbeatFile
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.listener import StopListener
 from bench_service.bench.stop.messages import made_secret
@@ -72,6 +72,9 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
             say(f"supervising bench {bench}")
         hung_s = hung_after_s(longest_safe_s(settings))
         watching = Supervisor(bench, devices, files, books, take_lease, channel, heartbeat, listener, hung_s=hung_s)
+        beats = Heartbeat(HeartbeatFile(folder, bench, of_supervisor=True), watching.goes_on)
+        beats.begin()
+        closing.callback(beats.end)
         watching.run(ending, companion)
     return 0
 

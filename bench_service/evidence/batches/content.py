@@ -34,11 +34,19 @@ def content_of(
     read = [
         ["method", method, version],
         ["parameters", parameters],
-        ["recordings", [[r.content_hash, r.station, r.start_s, r.launched_s, r.measured] for r in recordings]],
+        [
+            "recordings",
+            [[r.content_hash, r.station, r.start_s, r.launched_s, r.measured, *_named(r)] for r in recordings],
+        ],
         ["calibrations", [[c.id, c.value] for c in calibrations]],
         ["unit", unit],
     ]
     return hashlib.sha256(json.dumps(_plain(read), sort_keys=True).encode()).hexdigest()
+
+
+def _named(recording: RecordingInfo) -> list[str]:
+    """The name that stands in the result's texts, where the recording has one."""
+    return [recording.name] if recording.name else []
 
 
 def _plain(value: Any) -> Any:

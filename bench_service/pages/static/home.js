@@ -41,10 +41,19 @@ function stops(card, bench) {
     t("Stopped since"), " ", moment(stop.at), stop.by ? ` ${t("by")} ${stop.by}` : "", `: ${stop.reason}. `, h("code", {}, short(stop.id)), release(bench, stop))));
 }
 
+/** The reservation of a bench as it is now: the line stands below its state. */
+function reserved(card, kept) {
+  let line = card.querySelector("p.reserved");
+  if (!kept) { if (line) line.remove(); return; }
+  if (!line) card.querySelector(".state").after(line = h("p", { class: "reserved" }));
+  fill(line, t("Reserved for {holder} until", { holder: kept.holder }), " ", moment(kept.until), ` (${span(Math.max(0, (new Date(kept.until) - Date.now()) / 1000))}). `, kept.note);
+}
+
 function show({ bench, job }) {
   const card = document.getElementById(`bench-${bench.id}`);
   if (!card) { reload(); return; }
   stops(card, bench);
+  reserved(card, bench.reserved);
   const live = feed.lives.get(bench.id), progress = live && live.job && job && live.job.id === job.id ? live.job : null;
   const { safety } = bench, free = !job && !["busy", "manual"].includes(bench.state);
   fill(card.querySelector(".state"),
@@ -56,6 +65,7 @@ function show({ bench, job }) {
     job && h("progress", { max: 1, value: progress ? progress.fraction : job.progress.fraction, "aria-label": t("Progress") }),
     h("p", { class: safety.safe !== true && free ? "warning" : "note" }, job && !bench.stops.length && safety.safe === false
       ? `${t("It is in use:")} ${safety.devices.unsafe.join(", ")}.` : safety.explanation),
+    safety.silent_supervisor && h("p", { class: "warning" }, `${t("Its supervisor gives no heartbeat, so nobody watches over it:")} ${safety.silent_supervisor}`),
     live && live.devices && live.devices.chamber && h("p", { class: "note" }, `${t("Chamber")} ${number(Number(live.devices.chamber.air_c.toFixed(1)))} °C`));
 }
 

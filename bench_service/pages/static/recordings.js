@@ -5,21 +5,17 @@ import * as batches from "./batches.js";
 import { bytes, h, fill, moment, number, span, titled } from "./dom.js";
 import { SchemaForm } from "./form.js";
 import "./import_wizard.js";
+import { choosePeriod, moments } from "./period.js";
 import { t } from "./words.js";
 
 const at = (id) => document.getElementById(id), search = at("search"), chosen = new Map();
 let next = null, shown = null, body = null, methods = [], form = null, key = crypto.randomUUID();
 
-const jobs = new Map();
-
 const nameOf = (one) => one.station ? `${one.station.index}: ${one.station.label}` : ((one.source.files || [])[0] || {}).name || one.id;
 
-/** The job of a recording by number and procedure; each job is asked for once. */
-function jobOf(id) {
-  const link = h("a", { href: `/jobs/${id}` }, t("job"));
-  if (!jobs.has(id)) jobs.set(id, read(`/api/v1/jobs/${part(id)}`));
-  jobs.get(id).then((job) => link.replaceChildren(`#${job.number} ${titled(job.procedure)}`)).catch(() => jobs.delete(id));
-  return link;
+/** The job of a recording by number and procedure, as the list of recordings has them. */
+function jobOf(one) {
+  return h("a", { href: `/jobs/${one.job}` }, one.job_number === null ? t("job") : `#${one.job_number} ${titled(one.procedure)}`);
 }
 
 function count() { at("chosen").textContent = t("{n} chosen", { n: chosen.size }) + (chosen.size ? `: ${[...new Set([...chosen.values()].map((one) => `${one.unit} ${nameOf(one)}`))].slice(0, 3).join(", ")}${chosen.size > 3 ? ", …" : ""}` : ""); }
@@ -28,12 +24,13 @@ function row(one) {
   const name = nameOf(one);
   const box = h("input", { type: "checkbox", "data-recording": one.id, checked: chosen.has(one.id), "aria-label": t("Choose {name}", { name }) });
   box.addEventListener("change", () => { if (box.checked) chosen.set(one.id, one); else chosen.delete(one.id); count(); });
-  return h("tr", {}, h("td", {}, box), h("td", {}, h("a", { href: `/recordings/${one.id}` }, name)), h("td", {}, h("a", { href: `/units/${part(one.unit)}` }, one.unit)), h("td", {}, one.job ? jobOf(one.job) : t("imported")),
+  return h("tr", {}, h("td", {}, box), h("td", {}, h("a", { href: `/recordings/${one.id}` }, name)), h("td", {}, h("a", { href: `/units/${part(one.unit)}` }, one.unit)), h("td", {}, one.job ? jobOf(one) : t("imported")),
     h("td", { class: "n" }, `${number(one.rate_hz)} Hz`), h("td", { class: "n" }, span(one.duration_s)), h("td", { class: "n" }, bytes(one.stored_bytes)), h("td", {}, moment(one.created_at)), h("td", {}, one.warnings.join(" ")));
 }
 
 async function find(after = null) {
   const given = after ? shown : [...new FormData(search)].map(([name, value]) => [name, value.trim()]).filter(([, value]) => value);
+  if (!after) given.splice(0, given.length, ...Object.entries(moments(Object.fromEntries(given))));
   const asked = new URLSearchParams([...given, ["limit", "50"], ...(after ? [["after", after]] : [])]);
   const page = await busy(search.querySelector("button"), search.querySelector("output"), () => read(`/api/v1/recordings?${asked}`));
   if (!page) return;
@@ -93,12 +90,14 @@ async function analyse(event) {
   document.getElementById("batches").scrollIntoView({ block: "nearest" });
 }
 
+const showPeriod = choosePeriod(search, () => find());
 search.addEventListener("submit", (event) => { event.preventDefault(); find(); });
 at("older").addEventListener("click", () => find(next));
 at("method").addEventListener("change", () => choose(at("method").value));
 at("analyse").addEventListener("submit", analyse);
 const wanted = new URLSearchParams(location.search);
 for (const [name, value] of wanted) if (search.elements[name]) search.elements[name].value = value;
+showPeriod();
 count();
 find().then(() => chooseNamed(wanted.getAll("recording")));
 read("/api/v1/methods").then((all) => {

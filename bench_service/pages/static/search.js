@@ -2,6 +2,7 @@
 import { part, read } from "./api.js";
 import { busy } from "./act.js";
 import { badge, h, moment, titled } from "./dom.js";
+import { choosePeriod, moments } from "./period.js";
 import { t } from "./words.js";
 
 const form = document.getElementById("search"), found = document.getElementById("found"), older = document.getElementById("older");
@@ -15,9 +16,7 @@ export function jobRow(job) {
 
 function query() {
   const given = Object.fromEntries([...new FormData(form)].filter(([, value]) => value.trim() !== ""));
-  if (given.since) given.since = new Date(`${given.since}T00:00`).toISOString();
-  if (given.until) { const day = new Date(`${given.until}T00:00`); day.setDate(day.getDate() + 1); given.until = day.toISOString(); }
-  return new URLSearchParams(given);
+  return new URLSearchParams(moments(given));
 }
 
 async function search(after = null) {
@@ -36,15 +35,18 @@ async function search(after = null) {
   older.hidden = !next;
 }
 
-form.addEventListener("submit", (event) => {
-  event.preventDefault();
+function searchAnew() {
   const kept = new URLSearchParams([...new FormData(form)].filter(([, value]) => value.trim() !== ""));
   history.replaceState(null, "", kept.size ? `?${kept}` : location.pathname);
   search();
-});
+}
+
+const showPeriod = choosePeriod(form, searchAnew);
+form.addEventListener("submit", (event) => { event.preventDefault(); searchAnew(); });
 older.addEventListener("click", () => search(next));
 read("/api/v1/procedures").then((all) => {
   form.elements.procedure.append(...all.map((one) => h("option", { value: one.name }, t(one.title))));
   for (const [name, value] of new URLSearchParams(location.search)) if (form.elements[name]) form.elements[name].value = value;
+  showPeriod();
   search();
 }).catch((error) => { form.querySelector("output").textContent = error.message; });

@@ -9,6 +9,7 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
+from bench_service.bench.heartbeat import SUPERVISOR_SILENT_S, HeartbeatFile
 from bench_service.bench.processes import Driving, ProcessIdentity, living
 from bench_service.model.errors import BenchBusy
 
@@ -22,6 +23,7 @@ class HostFiles:
         self._bench_id = bench_id
         self._driver = folder / f"bench-{bench_id}.driver"
         self._supervisor = folder / f"bench-{bench_id}.supervisor"
+        self._heartbeat = HeartbeatFile(folder, bench_id, of_supervisor=True)
 
     def driving(self) -> Driving | None:
         """Return the process that drives, or last drove, the bench from this host; None where none ever did."""
@@ -52,7 +54,24 @@ class HostFiles:
         self._write(True)
 
     def supervisor(self) -> ProcessIdentity | None:
-        """Return the process that supervises the bench on this host, or None where none is alive."""
+        """Return the process that supervises the bench on this host, if one is alive and not silent."""
+        found = self.living_supervisor()
+        return None if found is None or self._silent(found) else found
+
+    def silent_supervisor(self) -> ProcessIdentity | None:
+        """Return the bench's supervisor on this host, if it is alive and has given no heartbeat for
+        `SUPERVISOR_SILENT_S`.
+        """
+        found = self.living_supervisor()
+        return found if found is not None and self._silent(found) else None
+
+    def _silent(self, supervisor: ProcessIdentity) -> bool:
+        """Return whether a supervisor is silent; one of an older version, which has no heartbeat, is not."""
+        age_s = self._heartbeat.age_s(supervisor)
+        return age_s is not None and age_s > SUPERVISOR_SILENT_S
+
+    def living_supervisor(self) -> ProcessIdentity | None:
+        """Return the process that has the right to supervise the bench on this host, silent or not, if one is alive."""
         try:
             process = ProcessIdentity(**json.loads(self._supervisor.read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):
@@ -67,8 +86,10 @@ class HostFiles:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             os.close(file)
-            other = self.supervisor() or "another process"
-            raise BenchBusy(f"bench {self._bench_id!r} is supervised by {other}") from None
+            other = self.living_supervisor()
+            silent = other is not None and self._silent(other)
+            more = ", which gives no heartbeat: it hangs or is suspended; end it (kill -9)" if silent else ""
+            raise BenchBusy(f"bench {self._bench_id!r} is supervised by {other or 'another process'}{more}") from None
         os.ftruncate(file, 0)
         os.pwrite(file, json.dumps(asdict(ProcessIdentity.own())).encode(), 0)
         return SupervisorLock(file)

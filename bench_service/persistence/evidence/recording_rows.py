@@ -23,10 +23,11 @@ def station_of_row(row: RecordingRow) -> Station | None:
 
 
 def info_of_row(row: RecordingRow) -> RecordingInfo:
-    """Return the description of a recording from its row."""
+    """Return the description of a recording from its row; an imported one is named by its first file."""
     return copied(
         RecordingInfo,
         row,
+        name=(row.file_names or "").partition(NAMES_JOIN)[0],
         channels=CHANNELS.validate_python(row.channels),
         count=row.samples,
         station=station_of_row(row),

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
@@ -94,11 +94,12 @@ class SqlRecordingStore:
         with self._database.read() as session:
             return tuple(stored_of_row(row) for row in session.scalars(_OF_JOB, {"job": job_id}))
 
-    def load(self, recording_id: str) -> StoredSamples:
+    def load(self, recording_id: str, name: str = "") -> StoredSamples:
         with self._database.read() as session:
             row = _found(session, recording_id)
             require_raw(row)
-            return StoredSamples(info_of_row(row), self._reader(row))
+            info = info_of_row(row)
+            return StoredSamples(replace(info, name=name) if name else info, self._reader(row))
 
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int

@@ -1,7 +1,7 @@
 """Units in SQL, as they are declared. Calibrations and corrections belong to the result store: only joined here."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -59,11 +59,17 @@ class SqlUnitStore:
             corrections = corrections_where(session, CorrectionRow.unit == serial, CorrectionRow.is_current)
         return _unit(document, calibrations, corrections)
 
-    def units(self) -> tuple[Unit, ...]:
+    def serials(self) -> tuple[str, ...]:
         with self._database.read() as session:
-            documents = session.scalars(select(UnitRow.document).order_by(UnitRow.serial)).all()
-            calibrations = calibrations_where(session, CalibrationRow.is_current)
-            corrections = corrections_where(session, CorrectionRow.is_current)
+            return tuple(session.scalars(select(UnitRow.serial).order_by(UnitRow.serial)))
+
+    def units(self, serials: Collection[str] | None = None) -> tuple[Unit, ...]:
+        of = lambda column: () if serials is None else (column.in_(serials),)  # noqa: E731
+        with self._database.read() as session:
+            query = select(UnitRow.document).where(*of(UnitRow.serial)).order_by(UnitRow.serial)
+            documents = session.scalars(query).all()
+            calibrations = calibrations_where(session, *of(CalibrationRow.unit), CalibrationRow.is_current)
+            corrections = corrections_where(session, *of(CorrectionRow.unit), CorrectionRow.is_current)
         calibrated: dict[str, list[StoredCalibration]] = defaultdict(list)
         corrected: dict[str, list[StoredCorrection]] = defaultdict(list)
         for calibration in calibrations:

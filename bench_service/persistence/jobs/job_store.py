@@ -13,7 +13,7 @@ from typing import Any
 from sqlalchemy import func, select
 
 from bench_service.model.errors import IllegalTransition, NotFound, NotUnderstood
-from bench_service.model.job import FINAL, Event, Failure, Job, JobState
+from bench_service.model.job import FINAL, Event, Failure, Job, JobHeading, JobState
 from bench_service.model.records import Idempotency, Page
 from bench_service.model.search import EVERYTHING, Search
 from bench_service.persistence.database import Database
@@ -68,6 +68,11 @@ class SqlJobStore:
         query = select(JobRow.id, JobRow.number).where(JobRow.id.in_(ids))
         with self._database.read() as session:
             return {row.id: row.number for row in session.execute(query)}
+
+    def headings(self, ids: Sequence[str]) -> dict[str, JobHeading]:
+        query = select(JobRow.id, JobRow.number, JobRow.procedure).where(JobRow.id.in_(ids))
+        with self._database.read() as session:
+            return {row.id: JobHeading(row.number, row.procedure) for row in session.execute(query)}
 
     def list(
         self,

@@ -109,6 +109,8 @@ class TemperatureDependenceDocument(Part):
     """Polynomials that correct the gyros; null: none was needed"""
     trace_c: tuple[tuple[float, ...], ...]
     """Temperature of each recording in cells, by the first channel's sensor [°C]"""
+    recordings: tuple[str, ...] = ()
+    """Title of each recording; empty in results from before titles were stored."""
 
 
 class TemperatureDependenceResult(ResultHead):

@@ -114,7 +114,7 @@ def alignments_for_display(
         attitude[0] %= 360.0
         told.append(
             Alignment(
-                info.station.label if info.station else info.id,
+                info.title,
                 plan.launches[i],
                 info.duration_s,
                 _triple(attitude),
