@@ -8,6 +8,9 @@ FOREIGN := basil edie instro ixcom moto visa
 LONG_BENCHMARKS := $(addprefix tests.benchmarks.,growth lists analysis_workers large_bags)
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
+# A shell that asks for no bytecode would have each of the suite's some hundred processes compile the product anew.
+export PYTHONDONTWRITEBYTECODE :=
+
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
