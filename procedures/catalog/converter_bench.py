@@ -53,7 +53,7 @@ class Params(JudgedParameters):
     record_s: float = Field(60.0, ge=1.0, le=86_400.0)
     sample_rate_hz: float = Field(100.0, ge=1.0, le=4000.0, description="the converter's cycles a second")
     reference_c: float = Field(20.0, ge=-100.0, le=200.0, description="reading of its sensor where Fc = 1, Fs = 0")
-    order: int | None = Field(None, ge=1, le=6, description="order of Fc and Fs; None: by the information criterion")
+    order: int | None = Field(None, ge=1, le=6, description="order of Fc and Fs; None: by F tests at a level of 0.01")
     gain_sd_ppm: float | None = Field(
         None, ge=0.0, le=1e6, description="standard uncertainty of the source's gain; None: as the bench declares"
     )
@@ -75,6 +75,9 @@ class ChannelResult:
     """Zero at the input of thesis 3.13."""
     scale_bic: tuple[float, ...]
     zero_bic: tuple[float, ...]
+    scale_p_values: tuple[float, ...] = ()
+    """F tests of order 2 against 1, 3 against 2; empty in results of older versions, whose order had the least BIC."""
+    zero_p_values: tuple[float, ...] = ()
 
 
 class Result(Outcome):
@@ -174,6 +177,8 @@ def _channel(name: str, fitted: FittedChannel, targets: list[float]) -> ChannelR
         tuple(fitted.zero_ma.tolist()),
         fitted.scale.bic,
         fitted.zero.bic,
+        fitted.scale.p_values,
+        fitted.zero.p_values,
     )
 
 
