@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncIterator, Coroutine, Generator, Sequence
 from contextlib import contextmanager
+from typing import cast
 
 from bench_service.evidence.catalogue import AnyProcedure
 from procedures.bench import Bench
@@ -13,7 +14,7 @@ from procedures.core.recording import Station
 def opened(procedure: AnyProcedure, bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
     """Begin the streams of a procedure's stations. Raises `ProcedureDefect` where `acquire` gives no async iterator."""
     with _program_goes_on(procedure.name):
-        streams: object = procedure.acquire(bench, stations)
+        streams = cast(object, procedure.acquire(bench, stations))  # whatever its author returns
     if isinstance(streams, AsyncIterator):
         return streams  # pyright: ignore[reportUnknownVariableType]  of streams, as `stream_of` checks
     kind = type(streams).__name__

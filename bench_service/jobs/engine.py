@@ -244,7 +244,7 @@ class Engine:
 
     def _unexpected(self, job_id: str, raised: Exception | SystemExit) -> StepOutcome:
         """The outcome of an unexpected error: a defect, or a failure of the database."""
-        error = self._understood(raised)
+        error = self._understood(raised) if isinstance(raised, Exception) else raised
         refused = isinstance(error, ServiceError)
         said = str(error) if refused else described(error)
         log.error("job %s failed inside the service: %s", job_id, said, exc_info=None if refused else error)

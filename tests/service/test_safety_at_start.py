@@ -1,4 +1,4 @@
-"""What a starting service does with devices that a dead process left, and how long a stop waits for a living one."""
+"""Starts of a service beside devices that a dead process left, and stops that wait for a living one: what is done."""
 
 from collections.abc import Callable
 from pathlib import Path
