@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, t
 
+from bench_service.model.quantities import quantities
 from procedures.analysis.thermal.converter_bench import ConverterSoaks, fit_channels
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, DeviceFault, SoakNotReached
@@ -104,6 +105,16 @@ def test_a_cube_that_the_soaks_show_is_kept():
     codes = np.stack([zero + 21840.0, zero - 21840.0], axis=1)[:, :, None] + random.normal(0.0, 0.006, (11, 2, 3))
     found = fit_channels(ConverterSoaks(sensor, np.column_stack([sensor, sensor]), codes), 10.0, 20.0, None)
     assert [len(channel.zero.value.coefficients) for channel in found] == [3, 3, 3]
+
+
+def test_the_limits_are_known_beforehand(result: Result):
+    planned = [(one.check, one.limit) for one in PROCEDURE.planned_checks(Params.model_validate(SHORT), CONTEXT)]
+    assert planned == [(c.name, c.limit) for c in result.checks]
+    promised = PROCEDURE.quantities
+    assert promised is not None
+    assert set(promised(Params.model_validate(SHORT), CONTEXT)) == set(quantities(result.model_dump(mode="json"))), (
+        "every name, and no other"
+    )
 
 
 def test_the_models_are_the_truth_within_their_uncertainties(result: Result):
