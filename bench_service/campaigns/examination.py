@@ -244,7 +244,7 @@ def _of_averaging_time(
     """The sentence on an averaging time that an earlier step is to give, where the plan's parameters follow it."""
     unit, procedure = plan.context.unit, plan.procedure
     stored = replace(plan.context, unit=replace(unit, averaging_time_s=stored_s))
-    if procedure.resolve(procedure.params.model_validate(parameters), stored) == plan.parameters:
+    if resolved(procedure, parameters, stored) == plan.parameters:
         return ()
     return (
         f"predicted with the averaging time of {unit.averaging_time_s:g} s that step {progress.averaging_time_of} is "
