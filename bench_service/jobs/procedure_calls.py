@@ -1,5 +1,6 @@
 """Calls of a procedure's own functions while a job is planned: what they give is checked before anything moves."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic_core import to_jsonable_python
@@ -12,7 +13,7 @@ from procedures.core.recording import Station
 from procedures.procedure import Context, Parameters, Prediction
 
 
-def resolved(procedure: AnyProcedure, requested: dict[str, Any], context: Context) -> Parameters:
+def resolved(procedure: AnyProcedure, requested: Mapping[str, Any], context: Context) -> Parameters:
     """Return the complete parameters of a request. Raises pydantic's `ValidationError`, `DomainError`; a
     `ProcedureDefect` where `resolve` fails or gives something else.
     """
