@@ -2,11 +2,15 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-WORKERS ?= 2
+# Half of the time of the slowest tests is waiting for processes: one worker more than cores keeps all of them at work.
+WORKERS ?= $(shell cores=$$(getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2); echo $$((cores < 3 ? cores + 1 : 4)))
 VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access absence document pdf_a certificates acceptance wires_campaign wires_thermal wires_response
 FOREIGN := basil edie instro ixcom moto visa
 LONG_BENCHMARKS := $(addprefix tests.benchmarks.,growth lists analysis_workers large_bags)
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
+
+# A shell that asks for no bytecode would have each of the suite's some hundred processes compile the product anew.
+export PYTHONDONTWRITEBYTECODE :=
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
@@ -28,7 +32,7 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep serving (ONCE=1: end with the verdict)
 	@$(BIN)/bench demo --port $(PORT) $(if $(ONCE),--once)
 
-test: $(VENV)/.ready  ## the whole test suite, in WORKERS (2) processes
+test: $(VENV)/.ready  ## the whole test suite, in WORKERS processes (one more than cores, at most 4)
 	@$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --durations=40 --durations-min=1
 
 $(VENV)/.browser: .ci/browser.lock $(VENV)/.ready

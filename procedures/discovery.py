@@ -30,7 +30,8 @@ def discovered(
 
     `only`: the name of the one module to import; None: all of them. Where there is no such module nothing is found.
 
-    A file is broken where its import fails, where it holds no such entry, or where that has another name than the file.
+    A file is broken where its import fails or would end the program, where it holds no such entry, or where that has
+    another name than the file.
     """
     found: Discovered[E] = Discovered()
     for module in iter_modules(path):
@@ -44,6 +45,9 @@ def discovered(
             name = getattr(entry, "name", None)
             if name != module.name:
                 raise ValueError(f"{place}: {attribute}.name is {name!r}, not the file's name")
+        except SystemExit as error:  # of a script: the service must outlive it
+            ended = ImportError(f"{place}: importing it ends the program with {error!r}")
+            found.broken[module.name] = ended.with_traceback(error.__traceback__)
         except Exception as error:  # whatever one file does, the others can be used
             found.broken[module.name] = error
         else:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from procedures.analysis.fitness.findings import Kind
 from procedures.analysis.fitness.watched import Inspection, Watch
 from procedures.analysis.measured_stations import at_measured_angles
-from procedures.core.errors import BadParameter, DomainError, MissingChannel
+from procedures.core.errors import BadParameter, DomainError, MissingChannel, ProcedureDefect
 from procedures.core.limits import BOUND_RULE, Check, OutcomeName, Verdict, decided, verdict
 from procedures.core.recording import Recording, cut
 from procedures.core.unit import Unit
@@ -35,7 +35,9 @@ def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording
     the first warning says so.
     """
     used, sentence = at_measured_angles(recordings) if context.bench.accuracy.measured else (recordings, "")
-    outcome = _inspected(used, procedure.inspection(params), lambda r: procedure.analyse(r, params, context))
+    outcome = _inspected(
+        used, procedure.inspection(params), _checked(procedure, lambda r: procedure.analyse(r, params, context))
+    )
     if sentence:
         outcome = outcome.model_copy(update={"warnings": (sentence, *outcome.warnings)})
     return judged(outcome, params)
@@ -50,7 +52,8 @@ def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Un
     def analyse(watched: Sequence[Recording]) -> R:
         return method.analyse(replace(evidence, recordings=tuple(watched)), params, unit)
 
-    return judged(_inspected(recordings, method.inspection(params, len(recordings)), analyse), params)
+    inspection = method.inspection(params, len(recordings))
+    return judged(_inspected(recordings, inspection, _checked(method, analyse)), params)
 
 
 def judged(outcome: R, params: object) -> R:
@@ -103,6 +106,24 @@ def _inspected(
         outcome = _explained(watch, analyse)
     found = (*watch.warnings(), *outcome.warnings)
     return outcome.model_copy(update={"warnings": tuple(dict.fromkeys(found))})
+
+
+def _checked(
+    entry: Procedure[P, R] | Method[P, R], analyse: Callable[[Sequence[Recording]], R]
+) -> Callable[[Sequence[Recording]], R]:
+    """The analysis, which must give the result that its entry promises, and may not end the program."""
+
+    def checked(recordings: Sequence[Recording]) -> R:
+        try:
+            outcome: object = analyse(recordings)
+        except SystemExit as ended:
+            raise ProcedureDefect(f"`analyse` of {entry.name} would end the program with {ended!r}") from ended
+        if not isinstance(outcome, entry.result):
+            given = type(outcome).__name__
+            raise ProcedureDefect(f"`analyse` of {entry.name} gave a {given}, not its {entry.result.__name__}")
+        return outcome
+
+    return checked
 
 
 def _explained(watch: Watch, analyse: Callable[[Sequence[Recording]], R]) -> R:

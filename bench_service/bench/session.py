@@ -8,7 +8,7 @@ from bench_service.bench.device_log import DeviceLog, made_by
 from bench_service.bench.driven import DrivenBench
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import PUBLISH_S
-from bench_service.bench.streams import require_end, stream_of
+from bench_service.bench.streams import opened, require_end, stream_of
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.model.job import Job
 from bench_service.model.records import NewRecording
@@ -60,7 +60,7 @@ class BenchSession(DrivenBench):
                 self._tell(self._tap)
         if self._streams is None or self._next != index:
             await self._close_streams()
-            self._streams = self._procedure.acquire(self._bench, self.job.stations[index:])
+            self._streams = opened(self._procedure, self._bench, self.job.stations[index:])
         stream = await stream_of(self._streams, self._procedure.name, station)
         info = await self._store(stream, station)
         self._next = index + 1

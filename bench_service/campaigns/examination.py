@@ -20,7 +20,8 @@ from bench_service.campaigns.faults import (
 )
 from bench_service.campaigns.gates import require_consistent
 from bench_service.campaigns.power import LimitPreview, preview
-from bench_service.jobs.planning import Plan, Planner, stations_of
+from bench_service.jobs.planning import Plan, Planner
+from bench_service.jobs.procedure_calls import quantities_of, resolved, stations_of
 from bench_service.model.errors import NotFound
 from procedures.core.errors import BadParameter, DomainError, NoCalibration
 from procedures.core.limits import Limit, PlannedCheck
@@ -197,7 +198,7 @@ class Examiner:
         self, step: Step, where: str, plan: Plan, unknown: tuple[str, ...], progress: Progress, rule: DecisionRule
     ) -> StepPlan:
         procedure, prediction = plan.procedure, plan.prediction
-        names = None if procedure.quantities is None else procedure.quantities(plan.parameters, plan.context)
+        names = quantities_of(procedure, plan.parameters, plan.context)
         require_known(step, where, names)
         warnings = [*prediction.warnings, *unknown]
         for position, limit in enumerate(step.limits):
@@ -232,9 +233,9 @@ class Examiner:
         if strict and not progress.calibrated:
             raise BadParameter(where, step.does, str(error)) from error
         procedure, context = self._catalogue.procedure(step.does), self._context(unit, bench, progress)
-        params = procedure.resolve(procedure.params.model_validate(step.parameters), context)
+        params = resolved(procedure, step.parameters, context)
         stations = stations_of(procedure, params)
-        require_known(step, where, None if procedure.quantities is None else procedure.quantities(params, context))
+        require_known(step, where, quantities_of(procedure, params, context))
         duration_s = sum(s.power_off_s + s.settle_s + s.record_s for s in stations)
         warning = "not predicted: the calibration that it uses is not there yet"
         return StepPlan(step.name, step.does, "", len(stations), duration_s, 0, (warning,))
@@ -246,7 +247,7 @@ def _of_averaging_time(
     """The sentence on an averaging time that an earlier step is to give, where the plan's parameters follow it."""
     unit, procedure = plan.context.unit, plan.procedure
     stored = replace(plan.context, unit=replace(unit, averaging_time_s=stored_s))
-    if procedure.resolve(procedure.params.model_validate(parameters), stored) == plan.parameters:
+    if resolved(procedure, parameters, stored) == plan.parameters:
         return ()
     return (
         f"predicted with the averaging time of {unit.averaging_time_s:g} s that step {progress.averaging_time_of} is "

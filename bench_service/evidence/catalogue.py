@@ -73,14 +73,19 @@ class Catalogue:
         return tuple(self._left_out.values())
 
     def report(self, result: StoredResult) -> Report:
-        """Return a stored result laid out for a person: tables and figures. Where its procedure is gone, a report that
-        says so.
+        """Return a stored result laid out for a person: tables and figures. Where its procedure is gone or cannot make
+        the report, a report that says so.
         """
         try:
             entry = self._required(result.kind, result.name)
         except NotFound:
             return Report(f"{result.name} is no longer in the catalogue; the document below is as it was stored.")
-        return entry.report(entry.result.model_validate(result.document))
+        try:
+            return entry.report(entry.result.model_validate(result.document))
+        except Exception as error:  # of the entry's author, or a document of an earlier version: the numbers are there
+            sentence = f"{result.name} made no report of this result: {described(error)}"
+            log.exception("result %s: %s", result.id, sentence)
+            return Report(f"{sentence}; the document below is as it was stored.")
 
     def _required(self, kind: str, name: str) -> Any:
         """Return the entry of a name, from its own file alone. Raises `NotFound`."""

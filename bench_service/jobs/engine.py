@@ -182,7 +182,7 @@ class Engine:
         except ShuttingDown:
             self._make_safe(job_id)
             raise
-        except Exception as error:  # the job must still end, and the bench be safe
+        except (Exception, SystemExit) as error:  # the job must still end, and the bench be safe
             self._make_safe(job_id)
             unexpected = self._unexpected(job_id, error)
             outcome = unexpected if self._last.good else self._last
@@ -236,15 +236,15 @@ class Engine:
         """Record one station's samples. After a bad outcome make the bench safe before the engine notes it."""
         try:
             outcome = self._runner.acquire(job_id, index)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             outcome = self._unexpected(job_id, error)
         if not outcome.good:
             self._make_safe(job_id)
         return outcome
 
-    def _unexpected(self, job_id: str, raised: Exception) -> StepOutcome:
+    def _unexpected(self, job_id: str, raised: Exception | SystemExit) -> StepOutcome:
         """The outcome of an unexpected error: a defect, or a failure of the database."""
-        error = self._understood(raised)
+        error = self._understood(raised) if isinstance(raised, Exception) else raised
         refused = isinstance(error, ServiceError)
         said = str(error) if refused else described(error)
         log.error("job %s failed inside the service: %s", job_id, said, exc_info=None if refused else error)

@@ -7,12 +7,14 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.mountings import MountingStore
 from bench_service.evidence.catalogue import AnyProcedure, Catalogue
 from bench_service.evidence.units import UnitStore
+from bench_service.jobs.procedure_calls import predicted, quantities_of, resolved, stations_of
 from bench_service.model.errors import NotFound, NotMounted
 from bench_service.model.mountings import StoredMounting
+from bench_service.telemetry.defects import author_is_named
 from bench_service.wall_clock import now
 from procedures.analysis.response.trace import ENCODER_CHANNELS
 from procedures.bench import BenchDescription
-from procedures.core.errors import BadParameter, ProcedureDefect
+from procedures.core.errors import BadParameter
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
 from procedures.procedure import Context, JudgedParameters, Parameters, Prediction
@@ -103,14 +105,14 @@ class Planner:
     def plan_in(self, context: Context, name: str, requested: dict[str, Any]) -> Plan:
         """Return the plan of a job in a context that is known; raises as `plan`, except for the context."""
         procedure = self.catalogue.procedure(name)
-        parameters = procedure.resolve(procedure.params.model_validate(requested), context)
+        parameters = resolved(procedure, requested, context)
         stations = stations_of(procedure, parameters)
         overdue = context.bench.overdue(now().date().isoformat())
         refused = overdue if context.bench.expired_certificates == "refuse" else ()
         violations = refused + tuple(
             f"station {s.index} ({s.label}): {sentence}" for s in stations for sentence in _violations(s, context.bench)
         )
-        prediction = procedure.predict(parameters, context)
+        prediction = predicted(procedure, parameters, context)
         _require_rules(procedure, parameters, context)
         if overdue and not refused:
             prediction = replace(prediction, warnings=(*prediction.warnings, *overdue))
@@ -128,25 +130,9 @@ def _require_rules(procedure: AnyProcedure, parameters: Parameters, context: Con
     """Refuse a decision rule for a check that the result will not have, where its names are known beforehand."""
     rules = parameters.decision if isinstance(parameters, JudgedParameters) else None
     if rules is not None and rules.by_check:
-        planned = [one.check for one in procedure.planned_checks(parameters, context)]
-        promised = () if procedure.quantities is None else procedure.quantities(parameters, context)
-        rules.require_known([*dict.fromkeys((*planned, *promised))])
-
-
-def stations_of(procedure: AnyProcedure, parameters: Parameters) -> tuple[Station, ...]:
-    """The stations of complete parameters. Raises `ProcedureDefect` where they are not numbered 0, 1, 2, … in order.
-
-    Recordings are found by these numbers after a crash, so a job with others would lose stations.
-    """
-    stations = tuple(procedure.schedule(parameters))
-    numbers = [station.index for station in stations]
-    if numbers != list(range(len(stations))):
-        found = ", ".join(map(str, numbers[:8])) + (", …" if len(numbers) > 8 else "")
-        raise ProcedureDefect(
-            f"procedure {procedure.name} numbers its {len(stations)} stations {found}: `schedule` must number them "
-            "from 0, in order: 0, 1, 2, …"
-        )
-    return stations
+        with author_is_named(procedure.name, "planned_checks"):
+            planned = [one.check for one in procedure.planned_checks(parameters, context)]
+        rules.require_known([*dict.fromkeys((*planned, *(quantities_of(procedure, parameters, context) or ())))])
 
 
 def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:

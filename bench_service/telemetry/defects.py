@@ -1,8 +1,19 @@
 """Describes an unexpected error in a sentence that names the file and the line to look at."""
 
+import logging
 import sys
 import traceback
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
+
+from pydantic import ValidationError
+
+from bench_service.model.errors import ServiceError
+from procedures.bench.errors import BenchError
+from procedures.core.errors import DomainError, ProcedureDefect
+
+log = logging.getLogger(__name__)
 
 PACKAGES = ("procedures", "simulators", "bench_service")
 CATALOGUES = ("procedures/catalog/", "procedures/methods/")
@@ -19,6 +30,21 @@ def described(error: BaseException) -> str:
     kind = f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}".strip(": ")
     places = _places(error)
     return f"{kind} ({'; raised in '.join(places)})" if places else kind
+
+
+@contextmanager
+def author_is_named(procedure: str, function: str) -> Generator[None]:
+    """Call a function of a procedure in this block: an error that its author did not foresee becomes a
+    `ProcedureDefect` that names file and line, and the log has the stack. Known errors pass as they are.
+    """
+    try:
+        yield
+    except (DomainError, BenchError, ServiceError, ValidationError):
+        raise
+    except (Exception, SystemExit) as error:
+        sentence = f"`{function}` of procedure {procedure} failed: {described(error)}"
+        log.exception("%s", sentence)
+        raise ProcedureDefect(sentence) from error
 
 
 def _places(error: BaseException) -> list[str]:

@@ -12,6 +12,7 @@ import pytest
 
 from procedures import catalog, methods
 from procedures.procedure import Outcome, Parameters
+from tests.kit.source_facts import facts
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("procedures", "simulators", "bench_service")
@@ -76,29 +77,24 @@ def test_no_docstring_begins_with_a_relative_clause() -> None:
     opened = [
         f"{path.relative_to(ROOT)}: {summary}"
         for path in SOURCES
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
-        and (summary := (ast.get_docstring(node) or "").split("\n")[0]).startswith(HEADLESS)
+        for defined in facts(path).definitions
+        if (summary := defined.docstring.split("\n")[0]).startswith(HEADLESS)
     ]
     assert opened == []
 
 
 def test_no_function_is_longer_than_a_page() -> None:
-    long = [entry for path in SOURCES for entry in _long_functions(path)]
+    long = [
+        f"{path.relative_to(ROOT)}:{defined.name} has {defined.lines} lines"
+        for path in SOURCES
+        for defined in facts(path).definitions
+        if defined.lines > FUNCTION_LINES
+    ]
     assert not long, f"name a part of it as a function; more than {FUNCTION_LINES} lines: {long}"
 
 
-def _long_functions(path: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            first = node.body[1] if ast.get_docstring(node) and len(node.body) > 1 else node.body[0]
-            lines = (node.end_lineno or 0) - first.lineno + 1
-            if lines > FUNCTION_LINES:
-                yield f"{path.relative_to(ROOT)}:{node.name} has {lines} lines"
-
-
 def test_every_module_says_what_it_knows_and_none_is_called_utils() -> None:
-    silent = [str(p.relative_to(ROOT)) for p in SOURCES if ast.get_docstring(ast.parse(p.read_text())) is None]
+    silent = [str(p.relative_to(ROOT)) for p in SOURCES if not facts(p).definitions[0].docstring]
     assert not silent, f"begin with a docstring: what the module knows, and what it must not know: {silent}"
     vague = [str(p.relative_to(ROOT)) for p in SOURCES if p.stem in BANNED_NAMES]
     assert not vague, f"name a module by its subject: {vague}"

@@ -1,12 +1,10 @@
 """Plain English, as far as a machine can tell: summaries, names and private words (docs/english.md)."""
 
-import ast
 import re
-from functools import cache
-from pathlib import Path
 
 from tests.kit.documents import PACKAGES, PAGES, ROOT
 from tests.kit.page_texts import of_scripts, of_templates
+from tests.kit.source_facts import facts
 
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 HEADLESS = ("What ", "Who ", "Whoever ", "Whose ", "Of ")
@@ -20,23 +18,13 @@ POETIC = re.compile(
 PRIVATE = re.compile(r"in our words|nobody's|\bthe told\b|\bpatience\b", re.IGNORECASE)
 
 
-@cache
-def _parsed(path: Path) -> tuple[ast.AST, ...]:
-    """Return the definitions of a file and the file itself; each of the tests reads all of them."""
-    defined = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
-    return tuple(node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, defined))
-
-
 def _summaries() -> list[tuple[str, str]]:
-    found = []
-    for path in SOURCES:
-        for node in _parsed(path):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-                text = ast.get_docstring(node)
-                if text:
-                    name = f"{path.relative_to(ROOT)}: {getattr(node, 'name', '')}"
-                    found.append((name, " ".join(text.split("\n\n")[0].split())))
-    return found
+    return [
+        (f"{path.relative_to(ROOT)}: {defined.name}", " ".join(defined.docstring.split("\n\n")[0].split()))
+        for path in SOURCES
+        for defined in facts(path).definitions
+        if defined.docstring
+    ]
 
 
 def test_summaries_begin_with_a_noun_or_a_verb_and_have_four_words() -> None:
@@ -62,10 +50,10 @@ def test_docstrings_of_tests_and_client_begin_so_too() -> None:
 
 def test_no_class_or_function_has_a_poetic_name() -> None:
     poetic = {
-        f"{path.relative_to(ROOT)}: {node.name}"
+        f"{path.relative_to(ROOT)}: {defined.name}"
         for path in SOURCES
-        for node in _parsed(path)
-        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and POETIC.match(node.name)
+        for defined in facts(path).definitions
+        if POETIC.match(defined.name)
     }
     assert poetic == set(), f"name it after its pattern or its thing, see docs/english.md: {poetic}"
 
@@ -89,11 +77,6 @@ def test_the_names_that_the_page_recommends_are_those_of_the_code() -> None:
     page = (ROOT / "docs" / "english.md").read_text(encoding="utf-8")
     pairs = re.findall(r"^\| `(\w+)` \| `(\w+)`", page, re.MULTILINE)
     assert len(pairs) >= 3
-    named = {
-        node.name
-        for path in SOURCES
-        for node in _parsed(path)
-        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
-    }
+    named = {defined.name for path in SOURCES for defined in facts(path).definitions}
     assert {after for _, after in pairs} - named == set()
     assert {before for before, _ in pairs} & named == set()

@@ -3,6 +3,7 @@
 import io
 import re
 import tokenize
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -35,17 +36,19 @@ def _texts(path: Path) -> list[tuple[str, str]]:
     return [*docstrings(path), *comments]
 
 
-TEXTS = [entry for path in SOURCES for entry in _texts(path)]
+@cache
+def _all_texts() -> list[tuple[str, str]]:
+    return [entry for path in SOURCES for entry in _texts(path)]
 
 
 def test_no_citation_is_a_bare_letter() -> None:
-    bare = [f"{place}: {found[0]}" for place, text in TEXTS if (found := BARE.search(text))]
+    bare = [f"{place}: {found[0]}" for place, text in _all_texts() if (found := BARE.search(text))]
     assert not bare, f"write the key of docs/sources.md, thesis 4.1, textbook S 4.119, paper F 12: {bare}"
     assert not re.search(r"\bT \d\.\d", texts_of_code()), "texts of reports cite the thesis by its name"
 
 
 def test_every_named_source_is_in_the_bibliography() -> None:
-    cited = {found[0].upper() + found[1:] for _, text in TEXTS for found in NAMED.findall(text)}
+    cited = {found[0].upper() + found[1:] for _, text in _all_texts() for found in NAMED.findall(text)}
     assert len(cited) > 12
     known = {key[0].upper() + key[1:] for key in KEYS}
     missing = {one for one in cited if not any(key == one or key.startswith(f"{one} ") for key in known)}
@@ -56,7 +59,7 @@ def test_every_dated_citation_is_in_the_bibliography() -> None:
     """A year in a docstring is that of a paper: an entry has this year and a surname that stands in the docstring."""
     dated = [
         (place, text, year)
-        for place, text in TEXTS
+        for place, text in _all_texts()
         for year in YEAR.findall(NO_CITATION.sub("", text))
         if not place.startswith("bench_service")  # its years are of clocks and formats, not of papers
     ]
@@ -79,7 +82,7 @@ def _authors(entry: str) -> list[str]:
 
 @pytest.mark.parametrize("word", ["design.md", "methods.md", "simulation.md", "facts:", "thesis_acceptance.json"])
 def test_no_source_is_a_file_that_is_not_here(word: str) -> None:
-    named = [place for place, text in TEXTS if word in text and "thesis_acceptance.json" not in place]
+    named = [place for place, text in _all_texts() if word in text and "thesis_acceptance.json" not in place]
     assert not named, f"{word} is no source: {named}"
 
 

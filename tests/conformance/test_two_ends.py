@@ -60,8 +60,8 @@ def test_a_hung_device_holds_up_no_other_one(tmp_path: Path) -> None:
         begun = time.monotonic()
         hung = asyncio.create_task(chamber.make_safe())
         await asyncio.gather(table.make_safe(), supply.make_safe())
-        # Braking from 60 deg/s takes 0.6 s of the bench, 0.03 s at this factor.
-        assert time.monotonic() - begun < 2.0
+        # Braking from 60 deg/s takes 0.6 s of the bench, 0.03 s at this factor; the chamber is given up after 6 s.
+        assert time.monotonic() - begun < 5.0
         assert not hung.done()
         assert not (await supply.read()).on
         assert not (await table.read()).moving

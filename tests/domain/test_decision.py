@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from procedures.core import limits
 from procedures.core.errors import BadParameter
 from procedures.core.limits import (
     Check,
@@ -192,3 +193,9 @@ def test_a_value_without_uncertainty_has_no_guard_band() -> None:
     found = decided(check("v", 0.95, Limit("1", maximum=1.0)), Rule("guarded")).decision
     assert found is not None
     assert (found.guard_band, found.expanded_uncertainty) == (0.0, None)
+
+
+def test_a_limit_names_the_source_of_its_default_unless_the_request_gave_another_value() -> None:
+    assert limits.asked_limit("1", 3.0, 3.0, "thesis 5.6") == Limit("1", maximum=3.0, source="thesis 5.6")
+    assert limits.asked_limit("1", 2.0, 3.0, "thesis 5.6") == Limit("1", maximum=2.0, source=limits.ASKED)
+    assert limits.ASKED not in ("", "thesis 5.6")

@@ -94,7 +94,7 @@ class BenchProcess:
             if job["progress"]["station"] >= stations or job["state"] in ("failed", "cancelled", "succeeded"):
                 return job
             assert monotonic_s() < deadline, job
-            pause(0.005)
+            pause(0.01 if stations <= job["progress"]["stations"] else 0.05)
 
     def recordings(self, job_id: str) -> list[dict[str, Any]]:
         return self.client.get("/api/v1/recordings", params={"job": job_id}).json()["items"]
@@ -126,10 +126,11 @@ class BenchProcess:
 
     @staticmethod
     def until(reached: Any, seconds: float) -> None:
-        deadline = monotonic_s() + seconds
+        deadline, look_s = monotonic_s() + seconds, 0.01
         while not reached():
             assert monotonic_s() < deadline, f"not within {seconds} s"
-            pause(0.01)
+            pause(look_s)
+            look_s = min(1.1 * look_s, 0.05)  # a look may take the service's time, which the job shares
 
 
 def one_master_at_a_time(entries: list[dict[str, Any]]) -> int:

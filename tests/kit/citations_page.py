@@ -4,6 +4,7 @@ import io
 import re
 import tokenize
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 from tests.kit.documents import PACKAGES, ROOT, docstrings
@@ -23,10 +24,11 @@ the text names the source without a place.
 """
 
 
-def keys() -> list[str]:
+@cache
+def keys() -> tuple[str, ...]:
     """The keys of the bibliography, in the order of its page."""
     page = SOURCES.read_text(encoding="utf-8")
-    return [key for key, _ in ENTRY.findall(page) if key not in ("key", "---")]
+    return tuple(key for key, _ in ENTRY.findall(page) if key not in ("key", "---"))
 
 
 def texts(path: Path) -> list[str]:
@@ -38,6 +40,7 @@ def texts(path: Path) -> list[str]:
     return [*(text for _, text in docstrings(path)), *comments]
 
 
+@cache
 def cited() -> dict[str, dict[str, set[str]]]:
     """Places of each key, and the modules that cite them."""
     found: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
@@ -54,6 +57,7 @@ def cited() -> dict[str, dict[str, set[str]]]:
     return found
 
 
+@cache
 def _pattern(key: str) -> str:
     """How a key stands in a text: a paper of a year by its first author, all others as they are."""
     dated = re.fullmatch(r"([\w ]+?)(?: and .*)? (?:1[89]|20)\d\d", key)

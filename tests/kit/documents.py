@@ -1,11 +1,11 @@
 """The documents of the project as tests read them: pages, blocks of commands with their marks, texts of the code."""
 
-import ast
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+
+from tests.kit.source_facts import facts
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / "README.md", ROOT / "client" / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -52,27 +52,9 @@ def _of_a_list(text: str, start: int) -> bool:
 def texts_of_code() -> str:
     """All string constants of the three packages, of the first check and of the client, a line each."""
     files = [p for package in (*PACKAGES, "client/bench_client") for p in (ROOT / package).rglob("*.py")]
-    strings: list[str] = []
-    for path in (*files, ROOT / ".preflight.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.JoinedStr):
-                parts = (v.value if isinstance(v, ast.Constant) else "…" for v in node.values)
-                strings.append("".join(str(part) for part in parts))
-            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                strings.append(node.value)
-    return "\n".join(strings)
+    return "\n".join(text for path in (*files, ROOT / ".preflight.py") for text in facts(path).texts)
 
 
-def docstrings(path: Path) -> Iterator[tuple[str, str]]:
+def docstrings(path: Path) -> tuple[tuple[str, str], ...]:
     """Name and text of every docstring of a file, also those of fields, in one line each."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        for part in body if isinstance(body, list) else []:
-            if (
-                isinstance(part, ast.Expr)
-                and isinstance(part.value, ast.Constant)
-                and isinstance(part.value.value, str)
-            ):
-                name = f"{path.relative_to(ROOT)}:{part.lineno}"
-                yield name, " ".join(part.value.value.split())
+    return facts(path).docstrings

@@ -61,12 +61,12 @@ def served(*devices: LineDevice) -> Generator[None]:
 
     thread = threading.Thread(target=lambda: loop.run_until_complete(serve()), daemon=True)
     thread.start()
-    assert ready.wait(5.0)
+    assert ready.wait(30.0)
     try:
         yield
     finally:
         loop.call_soon_threadsafe(over.set)
-        thread.join(5.0)
+        thread.join(30.0)
         for task in asyncio.all_tasks(loop):
             task.cancel()
         loop.run_until_complete(asyncio.sleep(0.05))

@@ -21,7 +21,11 @@ SUBJECTS = (
         "bench_service/bench/supervisor.py",
         ("tests/service/test_supervisor.py", "tests/service/test_supervisor_stops.py"),
     ),
-    Subject("safety", "bench_service/bench/safety.py", ("tests/service/test_safety.py", *NO_POSTGRES)),
+    Subject(
+        "safety",
+        "bench_service/bench/safety.py",
+        ("tests/service/test_safety.py", "tests/service/test_safety_at_start.py", *NO_POSTGRES),
+    ),
     Subject(
         "queue",
         "bench_service/persistence/jobs/queue_store.py",

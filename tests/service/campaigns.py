@@ -49,10 +49,11 @@ def run_of(client: Client, run_id: str) -> dict[str, Any]:
 
 def until(client: Client, run_id: str, wanted: Any, seconds: float = 60.0) -> dict[str, Any]:
     """Wait until the run is as wanted: a predicate of its view."""
-    deadline = monotonic_s() + seconds
+    deadline, look_s = monotonic_s() + seconds, 0.02
     while not wanted(run := run_of(client, run_id)):
         assert monotonic_s() < deadline, run
-        pause(0.03)
+        pause(look_s)
+        look_s = min(1.1 * look_s, 0.25)  # a look takes the service's time, which the steps share
     return run
 
 

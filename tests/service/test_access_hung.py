@@ -12,13 +12,14 @@ from bench_service.bench.stop.channel import StopChannel
 from bench_service.wall_clock import monotonic_s, pause
 from tests.chaos.databases import OwnPostgres, database
 from tests.database_away import hung
+from tests.kit.busy_machine import BUSY_S
 from tests.kit.people import House, house
 
 AFAR = {"X-Forwarded-For": "192.0.2.7"}
 """As a proxy on this host says for whom it asks: the request needs a proof."""
 STOP = "/api/v1/benches/sim/stop"
-IN_TIME_S = 6.0
-"""A stop waits 1 s for the database, and up to 0.3 s for its entry; the rest is for a loaded machine. A request that
+IN_TIME_S = BUSY_S
+"""A stop waits 1 s for the database, and up to 0.3 s for its entry; the rest is for a busy machine. A request that
 waits for the database waits for as long as it hangs."""
 FLOOD = 8
 """Stops in a row, as of a person who presses again and again, or of a program that does it by the thousand."""

@@ -12,13 +12,14 @@ from bench_service.access.credentials import IDLE, STOPS_AFTER_END
 from bench_service.api.access import identify
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.wall_clock import monotonic_s, now
+from tests.kit.busy_machine import BUSY_S
 from tests.kit.people import CSRF, House, house
 
 STOP = "/api/v1/benches/sim/stop"
 AFAR = {"X-Forwarded-For": "192.0.2.7"}
 """As a proxy on this host says for whom it asks: the request is from elsewhere, and needs a proof."""
-IN_TIME_S = 6.0
-"""Far below the 30 s for which a writer waits for the lock; above the 1.8 s of waiting and a loaded machine."""
+IN_TIME_S = BUSY_S
+"""Below the 30 s for which a writer waits for the lock; above the 1.8 s of waiting and a busy machine."""
 
 
 @pytest.fixture(scope="module")

@@ -28,6 +28,7 @@ from tests.chaos.databases import OwnPostgres, database
 from tests.database_away import hung
 from tests.kit.abandoned_bench import abandoned
 from tests.kit.begun_job import prepared
+from tests.kit.busy_machine import BUSY_S
 from tests.kit.failing_driver import IMPATIENT, FailingDriver
 from tests.kit.supervised_bench import GONE, Watch, identity, state
 from tests.service.client import Client
@@ -61,7 +62,7 @@ def test_a_supervisor_makes_the_bench_of_a_dead_worker_safe_and_says_so_later(
         watch.now = GONE
         begun_s = monotonic_s()
         while not state(tmp_path).safe:
-            assert monotonic_s() - begun_s < 2.0, "the supervisor waits for the database"
+            assert monotonic_s() - begun_s < BUSY_S, "the supervisor waits for the database"
             pause(0.02)
         assert thread.is_alive()
     stores, opened = open_stores(postgres.url)
@@ -100,17 +101,17 @@ def test_a_worker_sees_its_devices_and_its_own_end(
         with hung(postgres.data):
             pause(0.5)
             if silent:
-                failure = station.result(8).failure
+                failure = station.result(BUSY_S).failure
                 assert failure is not None
                 assert failure.kind == "Disconnected"
             else:
                 runner.shut_down()
                 with pytest.raises(ShuttingDown):
-                    station.result(8)
+                    station.result(BUSY_S)
             Thread(target=runner.make_safe, args=(job.id,), daemon=True).start()
             begun_s = monotonic_s()
             while not state(tmp_path).safe:
-                assert monotonic_s() - begun_s < 5.0, "the worker waits for the database"
+                assert monotonic_s() - begun_s < BUSY_S, "the worker waits for the database"
                 pause(0.02)
         go_on.set()
     runner.end_early(job.id, StepOutcome(cancelled=True))
@@ -140,7 +141,7 @@ def test_a_living_worker_gives_the_station_up_and_the_job_goes_on_after(
             assert not state(tmp_path).safe
             begun_s = monotonic_s()
             while not state(tmp_path).safe:
-                assert monotonic_s() - begun_s < 7.0, "the worker waits for the database"
+                assert monotonic_s() - begun_s < BUSY_S, "the worker waits for the database"
                 pause(0.02)
         ended = client.wait(job["id"])
         assert (ended["state"], ended["attempt"]) == ("succeeded", 2), ended["error"]

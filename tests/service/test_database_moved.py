@@ -9,9 +9,10 @@ from bench_service.cli.asking.client import connect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
+from tests.kit.busy_machine import BUSY_S
 from tests.service.client import Client
 
-SOON_S = 5.0
+SOON_S = BUSY_S
 """Longest time from the deletion to a bench that is safe [s]: a stop is looked for every 0.2 s, and unwinding takes up
 to a second; the rest is room for a busy machine."""
 

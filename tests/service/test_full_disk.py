@@ -138,7 +138,7 @@ def test_a_job_whose_failure_cannot_be_written_ends_once_there_is_space(
             pass
         assert_it_answers(client, job["id"], ready=False)
         (small_disk / "ballast").unlink()
-        ended = client.wait(job["id"], seconds=5)
+        ended = client.wait(job["id"])
         assert (ended["state"], ended["error"]["kind"]) == ("failed", "StorageFull")
         assert client.wait(client.submit(seed=3)["id"])["state"] == "succeeded"
 

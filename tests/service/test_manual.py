@@ -15,6 +15,7 @@ from bench_service.cli.asking.client import connect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, now, pause
+from tests.kit.busy_machine import BUSY_S
 from tests.service.client import Client
 
 BENCH = "/api/v1/benches/sim"
@@ -227,6 +228,7 @@ def test_it_is_refused_where_another_holder_has_reserved(client: Client) -> None
 
 def test_only_its_holder_commands_and_renews_and_anybody_ends(client: Client) -> None:
     hand = Hand(client)
+    hand.answered("supply_on")  # the lease has begun: one that ends before was nothing to make safe
     for path, body in (("demands", {"kind": "home"}), ("renew", {"minutes": 5})):
         answer = hand.http.post(f"{hand.path}/{path}", json={**body, "by": "bob"})
         assert (answer.status_code, answer.json()["type"]) == (403, "/problems/NotAllowed")
@@ -243,7 +245,7 @@ def test_a_stop_ends_it_at_once(client: Client, folder: Path) -> None:
     begun = monotonic_s()
     assert hand.http.post(f"{BENCH}/stop", json={"reason": "smoke"}).status_code == 202
     _until(lambda: _safe(folder))
-    assert monotonic_s() - begun < 2.0
+    assert monotonic_s() - begun < BUSY_S, "it turned to the end of its 30 s"
     assert hand.ended()["ended_because"].startswith("the bench was stopped")
     refused = hand.http.post(MANUAL, json={"reason": "now", "by": "ann"})
     assert (refused.status_code, "is stopped" in refused.json()["detail"]) == (409, True)
@@ -261,7 +263,7 @@ def test_it_ends_by_itself_in_mid_motion_while_the_service_is_busy(client: Clien
     assert _safe(folder)
     # A quarter of a second for the look at the time, a second for braking at the factor, and a busy machine.
     late_s = (_moment(lease["ended_at"]) - _moment(lease["until"])).total_seconds()
-    assert 0.0 <= late_s < 3.0
+    assert 0.0 <= late_s < BUSY_S
 
 
 def test_its_end_is_in_the_audit_trail(client: Client) -> None:

@@ -4,14 +4,13 @@ import logging
 import math
 from collections.abc import AsyncIterator, Callable, Generator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
-from bench_service.telemetry.defects import described
 from procedures import catalog, steps
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -30,6 +29,7 @@ BROKEN = {
     "misnamed": "from procedures.catalog.no_operation import PROCEDURE\n",
     "nameless": "SOMETHING = 1\n",
     "raising": "import numpy as np\n\nLIMIT = 1 / 0\n",
+    "script": "import sys\n\nsys.exit(3)\n",
 }
 
 
@@ -85,6 +85,29 @@ def analyse_to_infinite_check(recordings: Sequence[Recording], params: Params, c
     return Result(checks=checks, verdict=verdict(checks))
 
 
+def analyse_to_dictionary(recordings: Sequence[Recording], params: Params, context: Context) -> dict[str, str]:
+    return {"verdict": "pass"}
+
+
+def raising(error: BaseException) -> Callable[..., Any]:
+    def fails(*_: object) -> None:
+        raise error
+
+    return fails
+
+
+async def a_coroutine(bench: Bench, stations: Sequence[Station]) -> list[Stream]:
+    return [await steps.record_station(bench, station) for station in stations]
+
+
+def rest(**changed: object) -> Callable[[Params], tuple[Station, ...]]:
+    def schedule(params: Params) -> tuple[Station, ...]:
+        first, *others = stations_from(0)(params)
+        return (replace(first, **changed), *others)
+
+    return schedule
+
+
 def correction_with_nan(_: Result) -> tuple[UnitCorrection, ...]:
     x, y, z = converter(1).converter or ()
     return (UnitCorrection("converter", (replace(x, scale=replace(x.scale, at_reference=math.nan)), y, z)),)
@@ -122,6 +145,33 @@ DEFECTIVE = {
     "nan_correction": replace(SOUND, corrections=correction_with_nan),
     "boom": replace(SOUND, analyse=analyse_to_boom),
     "learns_nan": replace(SOUND, learns=learns_nan),
+    "dictionary": replace(SOUND, analyse=analyse_to_dictionary),
+    "ends_in_analyse": replace(SOUND, analyse=raising(SystemExit(3))),
+    "ends_in_acquire": replace(SOUND, acquire=raising(SystemExit(3))),
+    "coroutine": replace(SOUND, acquire=a_coroutine),
+    "unreported": replace(SOUND, report=raising(IndexError("no row"))),
+    "schedule_raises": replace(SOUND, schedule=raising(KeyError("dwell"))),
+    "schedule_ends": replace(SOUND, schedule=raising(SystemExit(3))),
+    "infinite_settling": replace(SOUND, schedule=rest(settle_s=math.inf)),
+    "negative_dwell": replace(SOUND, schedule=rest(record_s=-1.0)),
+    "resolve_raises": replace(SOUND, resolve=raising(AttributeError("unit"))),
+    "resolve_gives_nothing": replace(SOUND, resolve=lambda params, context: None),
+    "predict_raises": replace(SOUND, predict=raising(ZeroDivisionError("dwell"))),
+    "predict_gives_nothing": replace(SOUND, predict=lambda params, context: None),
+    "predicts_nan": replace(SOUND, predict=lambda params, context: Prediction(math.nan)),
+}
+REFUSED_PLANS = {
+    "schedule_raises": "`schedule` of procedure schedule_raises failed: KeyError: 'dwell' (",
+    "schedule_ends": "`schedule` of procedure schedule_ends failed: SystemExit: 3 (",
+    "infinite_settling": "`schedule` of procedure infinite_settling gave stations.0.settle_s = inf: a finite number",
+    "negative_dwell": "`schedule` of procedure negative_dwell gave stations.0.record_s = -1.0: a time from 0 s on",
+    "resolve_raises": "`resolve` of procedure resolve_raises failed: AttributeError: unit (",
+    "resolve_gives_nothing": "`resolve` of procedure resolve_gives_nothing gave a NoneType, not a Params",
+    "predict_raises": "`predict` of procedure predict_raises failed: ZeroDivisionError: dwell (",
+    "predict_gives_nothing": "`predict` of procedure predict_gives_nothing gave a NoneType, not a Prediction",
+    "predicts_nan": "`predict` of procedure predicts_nan gave prediction.duration_s = nan: a finite number",
+    "numbered_from_one": "procedure numbered_from_one numbers its 3 stations 1, 2, 3: `schedule` must number them "
+    "from 0, in order: 0, 1, 2, …",
 }
 
 
@@ -187,6 +237,19 @@ def test_a_sound_one_passes(client: Client) -> None:
             "procedure backwards gave the stream of station 2 (rest 3) where station 0 (rest 1) was due: `acquire` "
             "must yield one for each station, unchanged and in order",
         ),
+        ("dictionary", "ProcedureDefect", "`analyse` of dictionary gave a dict, not its Result"),
+        ("ends_in_analyse", "ProcedureDefect", "`analyse` of ends_in_analyse would end the program with SystemExit(3)"),
+        (
+            "ends_in_acquire",
+            "ProcedureDefect",
+            "`acquire` of procedure ends_in_acquire would end the program with SystemExit(3)",
+        ),
+        (
+            "coroutine",
+            "ProcedureDefect",
+            "`acquire` of procedure coroutine gave a coroutine: it must be an async generator, `async def` with "
+            "`yield`",
+        ),
     ],
 )
 def test_a_defect_ends_the_job_at_once_with_a_sentence(
@@ -217,17 +280,28 @@ def test_a_record_of_the_unit_that_cannot_be_stored_is_not_tried_again(client: C
     assert "cannot be stored" in job["error"]["message"]
 
 
-@pytest.mark.parametrize("path", ["/api/v1/procedures/numbered_from_one/preview", "/api/v1/jobs"])
-def test_stations_that_are_not_numbered_from_zero_are_refused_in_the_plan(client: Client, path: str) -> None:
+@pytest.mark.parametrize(("procedure", "sentence"), REFUSED_PLANS.items(), ids=REFUSED_PLANS)
+@pytest.mark.parametrize("path", ["/api/v1/procedures/{}/preview", "/api/v1/jobs"], ids=["preview", "job"])
+def test_a_plan_that_cannot_be_is_refused_before_anything_moves(
+    client: Client, path: str, procedure: str, sentence: str
+) -> None:
     before = client.stored()
-    body = {"unit": "SIM-0001"} | ({"procedure": "numbered_from_one"} if path.endswith("jobs") else {})
-    answer = client.http.post(path, json=body)
+    body = {"unit": "SIM-0001"} | ({"procedure": procedure} if path.endswith("jobs") else {})
+    answer = client.http.post(path.format(procedure), json=body)
     assert (answer.status_code, answer.json()["type"]) == (422, "/problems/ProcedureDefect")
-    assert answer.json()["detail"] == (
-        "procedure numbered_from_one numbers its 3 stations 1, 2, 3: `schedule` must number them from 0, in order: "
-        "0, 1, 2, …"
-    )
+    assert answer.json()["detail"].startswith(sentence)
+    if sentence.endswith("("):  # the place: this procedure lies beside the project's code, so its caller's
+        assert "(bench_service/jobs/procedure_calls.py, line " in answer.json()["detail"]
     assert client.stored() == before
+
+
+def test_a_result_whose_report_cannot_be_made_is_shown_without_it(client: Client) -> None:
+    result = ended(client, "unreported")["result"]
+    report = client.http.get(f"/api/v1/results/{result}/report").json()
+    assert report["summary"].startswith("unreported made no report of this result: IndexError: no row (")
+    page = client.http.get(f"/results/{result}")
+    assert page.status_code == 200
+    assert "IndexError: no row" in page.text
 
 
 def test_broken_files_are_left_out_and_named_and_the_others_serve(client: Client) -> None:
@@ -242,54 +316,10 @@ def test_broken_files_are_left_out_and_named_and_the_others_serve(client: Client
         "misnamed": "PROCEDURE.name is 'no_operation', not the file's name",
         "nameless": "there is no PROCEDURE, which must be a Procedure",
         "raising": "ZeroDivisionError: division by zero",
+        "script": "ImportError: broken_catalogue.script: importing it ends the program with SystemExit(3)",
     }
     for name, sentence in expected.items():
         assert sentence in notes[f"procedures/catalog/{name}.py"]
         asked = client.http.get(f"/api/v1/procedures/{name}")
         assert asked.status_code == 404
         assert sentence in asked.json()["detail"]
-
-
-def raised(file: str, *further: str) -> Exception:
-    """An error that was raised in `further[-1]`, which was called from the files before it."""
-    code = compile("def analyse(call):\n    call()\n", file, "exec")
-    names: dict = {}
-    exec(code, names)
-
-    def boom() -> None:
-        raise ValueError("boom")
-
-    call = boom
-    for inner in reversed(further):
-        space: dict = {}
-        exec(compile("def helper(call):\n\n    call()\n", inner, "exec"), space)
-        call = partial(space["helper"], call)
-    try:
-        names["analyse"](call)
-    except ValueError as error:
-        return error
-    raise AssertionError
-
-
-ROOT = Path(__file__).resolve().parents[2]
-TUMBLE, FRAMES, REST = (f"{ROOT}/procedures/{name}.py" for name in ("catalog/tumble", "core/frames", "methods/rest"))
-
-
-@pytest.mark.parametrize(
-    ("files", "place"),
-    [
-        ((TUMBLE,), "procedures/catalog/tumble.py, line 2, in analyse"),
-        (
-            (TUMBLE, FRAMES),
-            "procedures/catalog/tumble.py, line 2, in analyse; raised in procedures/core/frames.py, line 3, in helper",
-        ),
-        ((REST, "/opt/elsewhere/fit.py"), "procedures/methods/rest.py, line 2, in analyse"),
-        ((FRAMES, "/opt/elsewhere/fit.py"), "procedures/core/frames.py, line 2, in analyse"),
-    ],
-)
-def test_the_place_that_an_author_looks_at_comes_first(files: tuple[str, ...], place: str) -> None:
-    assert described(raised(*files)) == f"ValueError: boom ({place})"
-
-
-def test_an_error_without_message_or_place_is_its_kind() -> None:
-    assert described(StopAsyncIteration()) == "StopAsyncIteration"

@@ -7,8 +7,9 @@ import pytest
 
 from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
-from bench_service.wall_clock import now, pause
+from bench_service.wall_clock import now
 from tests.service.client import Client
+from tests.service.jumping_clock import JumpingClock
 
 
 @pytest.fixture
@@ -76,15 +77,17 @@ def test_jobs_of_others_wait_for_the_holder(client: Client, what: dict[str, str]
     ended = client.http.delete(f"/api/v1/reservations/{kept['id']}").json()
     assert ended["active"] is False
     assert ended["ended_at"] is not None
-    assert client.wait(theirs["id"], seconds=5.0)["state"] == "succeeded"
+    assert client.wait(theirs["id"])["state"] == "succeeded"
     assert "reserved by Ann" in client.http.get(f"/api/v1/jobs/{theirs['id']}/events").text
 
 
-def test_a_reservation_ends_by_itself_and_its_job_becomes_an_ordinary_one(stopped: Client) -> None:
-    assert stopped.preview("no_operation").is_success  # the catalogue is read before time counts
-    kept = reserve(stopped, unit="SIM-0001", until=(now() + timedelta(seconds=2.0)).isoformat())
+def test_a_reservation_ends_by_itself_and_its_job_becomes_an_ordinary_one(
+    stopped: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall = JumpingClock(monkeypatch)
+    kept = reserve(stopped, unit="SIM-0001", until=(now() + timedelta(minutes=2)).isoformat())
     job = stopped.submit("no_operation", reservation=kept["id"])
-    pause(2.1)
+    wall.jump(minutes=2, seconds=1)
     expired = stopped.http.post(
         "/api/v1/jobs", json={"procedure": "no_operation", "unit": "SIM-0001", "reservation": kept["id"]}
     )

@@ -15,6 +15,7 @@ from bench_service.bench.stop.word import StopAnswer, StopWord
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.wall_clock import monotonic_s, pause
+from tests.kit.busy_machine import BUSY_S
 from tests.kit.supervised_bench import Books, Lease, Watch, identity, supervised
 
 
@@ -48,7 +49,7 @@ def work(channel: StopChannel, tmp_path: Path) -> Generator[Work]:
 
 
 def until(channel: StopChannel, word: StopWord, state: str) -> None:
-    deadline = monotonic_s() + 5
+    deadline = monotonic_s() + BUSY_S
     while channel.state(word.id) != state and monotonic_s() < deadline:
         pause(0.02)
     assert channel.state(word.id) == state

@@ -15,6 +15,7 @@ from bench_service.model.errors import NotSafe
 from bench_service.persistence import open_stores
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s
+from tests.kit.busy_machine import BUSY_S
 from tests.service.client import Client
 from tests.service.page import page
 
@@ -191,7 +192,7 @@ def test_a_stop_on_its_own_host_that_nothing_has_taken_is_answered_with_503_and_
             other.execute("ROLLBACK")
             other.close()
         assert answer.status_code == 503, answer.text
-        assert took_s < 6.0, "a second for the database, far below the 30 s of its lock, and a loaded machine"
+        assert took_s < BUSY_S, "a second for the database, below the 30 s of its lock"
         said = answer.json()["detail"]
         assert "has NOT reached bench 'sim': its stop channel on this host takes nothing" in said
         assert f"Press the hardware emergency stop, or run `bench stop --bench sim` at host {HOST}" in said

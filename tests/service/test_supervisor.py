@@ -17,6 +17,7 @@ from bench_service.model.errors import BenchBusy, StorageFailure
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench.errors import DeviceFault
 from tests.kit.abandoned_bench import abandoned
+from tests.kit.busy_machine import BUSY_S
 from tests.kit.supervised_bench import GONE, Books, Lease, Watch, identity, look_for, state, supervised
 
 
@@ -48,7 +49,7 @@ def test_a_database_that_does_not_answer_keeps_no_bench_from_being_safe(tmp_path
     begun = monotonic_s()
     supervisor.look()
     assert state(tmp_path).safe
-    assert monotonic_s() - begun < 2.0
+    assert monotonic_s() - begun < BUSY_S
     supervisor.look()
     assert books.said == []
     books.answers = True
@@ -204,13 +205,13 @@ def test_a_wall_clock_that_jumps_changes_no_judgement(
 ) -> None:
     devices, books = RegisteredDevices(abandoned(tmp_path)), Books()
     books.is_stopped = True
-    supervisor = supervised(tmp_path, devices, Watch(Driving(identity(worker))), books, Lease().take, hung_s=5.0)
+    supervisor = supervised(tmp_path, devices, Watch(Driving(identity(worker))), books, Lease().take, hung_s=60.0)
     real = wall_clock.now
     for days in (400, -400, 0):
         monkeypatch.setattr(wall_clock, "now", lambda days=days: real() + timedelta(days=days))
         supervisor.look()
         pause(0.1)
-    assert worker.poll() is None, "a jump of the clock was taken for ten seconds without an answer"
+    assert worker.poll() is None, "a jump of the clock was taken for a minute without an answer"
 
 
 def test_devices_that_a_living_worker_has_left_unsafe_are_made_safe_without_any_stop(

@@ -13,6 +13,7 @@ import sqlalchemy as sa
 
 from bench_service.model.errors import BenchBusy, StorageFailure
 from bench_service.persistence import BenchLease, acquire_lease, open_stores
+from bench_service.persistence.bench import lease as lease_module
 from bench_service.persistence.bench.lease import lease_holder
 from bench_service.wall_clock import monotonic_s, pause
 
@@ -123,6 +124,42 @@ def test_the_process_that_drives_a_bench_is_named_and_a_supervisor_is_none(datab
     assert lease_holder(database, database_url, "sim") is None, "a supervisor makes a bench safe, it drives none"
     passing.release()
     database.dispose()
+
+
+def test_a_process_that_starts_waits_for_a_supervisor_and_for_nobody_else(
+    database_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A supervisor has the lease for a moment, to make the bench safe; it waits for none itself."""
+    passing, attempt, attempts = acquire_lease(database_url, "sim", "supervisor"), lease_module._lease, 0
+
+    def attempted(*arguments: str) -> BenchLease:
+        nonlocal attempts
+        attempts += 1
+        if attempts == 3:
+            passing.release()
+        return attempt(*arguments)
+
+    monkeypatch.setattr(lease_module, "_lease", attempted)
+    lease = acquire_lease(database_url, "sim")
+    assert lease.held()
+    assert attempts >= 3
+    attempts = 3
+    with pytest.raises(BenchBusy, match="process"):
+        acquire_lease(database_url, "sim")
+    assert attempts == 4, "a process that drives the bench keeps it: nobody waits"
+    lease.release()
+
+
+def test_a_supervisor_that_stays_is_not_waited_for_for_ever(sqlite_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    passing = acquire_lease(sqlite_url, "sim", "supervisor")
+    monkeypatch.setattr(lease_module, "PASSING_S", 0.1)
+    begun_s = monotonic_s()
+    with pytest.raises(BenchBusy, match="supervisor"):
+        acquire_lease(sqlite_url, "sim")
+    assert monotonic_s() - begun_s >= 0.1
+    with pytest.raises(BenchBusy, match="supervisor"):
+        acquire_lease(sqlite_url, "sim", "supervisor")
+    passing.release()
 
 
 def test_a_lease_whose_lock_file_was_taken_away_is_lost(sqlite_url: str, tmp_path: Path) -> None:

@@ -170,6 +170,7 @@ async def _on_http(request: Request, error: Exception) -> Response:
 async def _on_unknown(request: Request, error: Exception) -> Response:
     response = respond(request, 500, "a defect of the service; its log has the details", "InternalError")
     response.headers.update(SECURITY_HEADERS)  # this answer is made outside of all that adds to answers
+    response.headers["Connection"] = "close"  # the server closes it: a client that asked on it would find it broken
     return response
 
 

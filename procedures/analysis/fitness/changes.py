@@ -7,7 +7,7 @@ same gap at every scale, a bend one that grows with h: so a quarter of the cells
 on either side as well, which an outlier does not move.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,8 +58,9 @@ def changes(
         return found
     centred = series - np.median(series, axis=1, keepdims=True)
     most = np.zeros(len(series))
+    sums = _Sums.of(centred)
     for h in _scales(series.shape[1]):
-        gaps = np.abs(_gaps(centred, h, flat))
+        gaps = np.abs(_gaps(sums, h, flat))
         most = np.maximum(most, np.max(gaps / _spread(gaps)[:, None], axis=1, initial=0.0))
     least = (FLAT if flat else SIGNIFICANT) if least is None else least
     for c in np.flatnonzero(most > least):
@@ -73,17 +74,29 @@ def _scales(cells: int) -> list[int]:
     return [1 << j for j in range(2, 20) if POSITIONS << j <= cells]
 
 
-def _gaps(y: Array, h: int, flat: bool) -> Array:
+@dataclass(frozen=True)
+class _Sums:
+    """Σy and Σy·j over the cells before each border, (channels, K + 1), for all scales."""
+
+    total: Array
+    moment: Array
+
+    @classmethod
+    def of(cls, y: Array) -> "_Sums":
+        zero, j = np.zeros((len(y), 1)), np.arange(y.shape[1], dtype=np.float64)
+        return cls(np.hstack([zero, np.cumsum(y, axis=1)]), np.hstack([zero, np.cumsum(y * j, axis=1)]))
+
+
+def _gaps(sums: _Sums, h: int, flat: bool) -> Array:
     """G_h at the borders h … K − h, (channels, K − 2h + 1)."""
-    j = np.arange(y.shape[1], dtype=np.float64)
-    zero = np.zeros((len(y), 1))
-    s0, s1 = np.hstack([zero, np.cumsum(y, axis=1)]), np.hstack([zero, np.cumsum(y * j, axis=1)])
-    k = np.arange(h, y.shape[1] - h + 1)
-    left, right = s0[:, k] - s0[:, k - h], s0[:, k + h] - s0[:, k]
+    s0, s1, cells = sums.total, sums.moment, sums.total.shape[1] - 1
+    before, here, after = slice(0, cells - 2 * h + 1), slice(h, cells - h + 1), slice(2 * h, cells + 1)
+    left, right = s0[:, here] - s0[:, before], s0[:, after] - s0[:, here]
     if flat:
         return (right - left) / h
-    near_left = (k - 0.5) * left - (s1[:, k] - s1[:, k - h])
-    near_right = s1[:, k + h] - s1[:, k] - (k - 0.5) * right
+    k = np.arange(h, cells - h + 1)
+    near_left = (k - 0.5) * left - (s1[:, here] - s1[:, before])
+    near_right = s1[:, after] - s1[:, here] - (k - 0.5) * right
     return _intercept(right, near_right, h) - _intercept(left, near_left, h)
 
 
@@ -106,8 +119,9 @@ def _of_row(y: Array, floor: float, uneven: Array, flat: bool, least: float) -> 
     y = y.copy()
     found: list[Change] = []
     barred = np.zeros(len(y) + 1, np.bool_)
+    usual = {h: np.maximum(_beside(uneven, h), 1.0) for h in _scales(len(y))}
+    scales = _all_scales(y, usual, flat)
     for _ in range(TRIES):
-        scales = [_Scale.of(y, h, uneven, flat) for h in _scales(len(y))]
         best = _best(scales, barred, least)
         if best is None or len(found) >= MOST:
             break
@@ -119,6 +133,7 @@ def _of_row(y: Array, floor: float, uneven: Array, flat: bool, least: float) -> 
             # The step lies within one of the cells at the border, which would pass for an outlier.
             y[k - 1], y[k] = np.median(y[max(k - 5, 0) : k - 1]), np.median(y[k + 1 : k + 5])
             barred[max(k - SHORTEST // 2, 0) : k + SHORTEST // 2] = True
+            scales = _all_scales(y, usual, flat)
         else:
             barred[max(k - h // 2, 0) : k + h // 2 + 1] = True
     return sorted(found, key=lambda change: change.index)
@@ -132,10 +147,12 @@ class _Scale:
     gaps: Array
     spread: Array
 
-    @classmethod
-    def of(cls, y: Array, h: int, uneven: Array, flat: bool) -> "_Scale":
-        gaps = _gaps(y[None], h, flat)
-        return cls(h, gaps[0], float(_spread(np.abs(gaps))[0]) * np.maximum(_beside(uneven, h), 1.0))
+
+def _all_scales(y: Array, usual: Mapping[int, Array], flat: bool) -> list[_Scale]:
+    """The gaps of a row at all scales; `usual`: ratio of the noise at each border to its usual one, by scale."""
+    sums = _Sums.of(y[None])
+    gaps = {h: _gaps(sums, h, flat) for h in usual}
+    return [_Scale(h, gaps[h][0], float(_spread(np.abs(gaps[h]))[0]) * usual[h]) for h in usual]
 
 
 def _best(scales: Sequence[_Scale], barred: NDArray[np.bool_], most: float) -> tuple[int, int] | None:
