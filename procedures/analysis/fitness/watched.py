@@ -8,15 +8,22 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-import numpy as np
-
 from procedures.analysis.fitness.findings import ChannelFitness, FitnessSettings, Kind, Severity
 from procedures.analysis.fitness.grouped import grouped
 from procedures.analysis.fitness.jumps import Jump
+from procedures.analysis.fitness.mended import Mended
 from procedures.analysis.fitness.stream import FitnessStream
+from procedures.analysis.parts import Picked, of_channels
 from procedures.core import spread
 from procedures.core.errors import UnfitRecording
-from procedures.core.recording import Channel, Quantity, RawArray, Recording, RecordingInfo, Station
+from procedures.core.recording import (
+    Channel,
+    Quantity,
+    RawArray,
+    Recording,
+    RecordingInfo,
+    Station,
+)
 
 A = TypeVar("A")
 R = TypeVar("R")
@@ -78,7 +85,7 @@ class Watched:
     def blocks(self) -> Iterator[RawArray]:
         """Yield the blocks; the end of the first pass raises `UnfitRecording` where the recording is refused."""
         if self._fitness is not None:
-            yield from self._again()
+            yield from self._later().blocks()
             return
         stream = self._stream()
         for block in self._recording.blocks():
@@ -86,6 +93,13 @@ class Watched:
             yield block
         self._end(stream)
         self.require_fit()
+
+    def only(self, names: Sequence[str]) -> Recording:
+        """Return some of the channels, in that order, for a later pass. Raises `MissingChannel`.
+
+        Before the first pass, which is the inspection, all are read.
+        """
+        return of_channels(self._later(), names) if self._fitness is not None else Picked.of(self, names)
 
     @property
     def unwatched(self) -> Recording:
@@ -131,6 +145,10 @@ class Watched:
         """Replace each outlier in later passes by the mean of its two neighbours."""
         self._mended = True
 
+    def _later(self) -> Recording:
+        """The recording as passes after the first see it."""
+        return Mended(self._recording, self._outliers) if self._mended else self._recording
+
     def _stream(self) -> FitnessStream:
         info = self.info
         settings = self._inspection.of_station(info.station)
@@ -142,26 +160,6 @@ class Watched:
         self._fitness = tuple(f for f in found if f is not None)
         if self._inspection.settings.mends_outliers:
             self._outliers = stream.outliers()
-
-    def _again(self) -> Iterator[RawArray]:
-        start = 0
-        for block in self._recording.blocks():
-            yield self._without_outliers(block, start) if self._mended else block
-            start += len(block)
-
-    def _without_outliers(self, block: RawArray, start: int) -> RawArray:
-        inside = [
-            (jump.index - start, c, jump.size)
-            for c, jumps in self._outliers.items()
-            for jump in jumps
-            if start <= jump.index < start + len(block)
-        ]
-        if not inside:
-            return block
-        mended = block.copy()
-        for row, column, away in inside:
-            mended[row, column] -= round(away) if np.issubdtype(mended.dtype, np.integer) else away
-        return mended
 
 
 Seen = tuple[tuple[ChannelFitness, ...], dict[int, list[Jump]]]
