@@ -63,7 +63,7 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
             "rate_hz": repr(float(place.rate_hz)),
         },
     )
-    columns = [arrow_array(samples[:, index]) for index in range(len(names))]
+    columns = [arrow_array(row) for row in np.ascontiguousarray(samples.T)]
     sink = pa.BufferOutputStream()
     pq.write_table(
         pa.Table.from_arrays(columns, schema=schema),
