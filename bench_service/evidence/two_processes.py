@@ -16,6 +16,7 @@ from importlib import import_module
 from threading import Thread
 from typing import TypeVar
 
+from bench_service.collector import no_collection
 from bench_service.evidence.work_processes import Refusal, begin_process
 from bench_service.model.errors import ServiceError
 from procedures.core.errors import DomainError
@@ -45,8 +46,9 @@ def begin_both() -> None:
     from threadpoolctl import threadpool_limits
 
     _keep_freed_memory()
-    for name in MODULES:
-        import_module(name)
+    with no_collection():  # frozen then: a collection would also unshare the pages of both
+        for name in MODULES:
+            import_module(name)
     threadpool_limits(1)
     second = ProcessPoolExecutor(1, multiprocessing.get_context("fork"), begin_process)
     second.submit(os.getpid)  # forks, before this process has a thread of its own

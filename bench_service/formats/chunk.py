@@ -63,7 +63,7 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
             "rate_hz": repr(float(place.rate_hz)),
         },
     )
-    columns = [arrow_array(row) for row in np.ascontiguousarray(samples.T)]
+    columns = [arrow_array(row) for row in np.ascontiguousarray(samples.T[: len(names)])]
     sink = pa.BufferOutputStream()
     pq.write_table(
         pa.Table.from_arrays(columns, schema=schema),
