@@ -12,12 +12,12 @@ from procedures.analysis.turns.ferraris import analyse_ferraris, rest_means
 from procedures.analysis.turns.summary import WholeTurns
 from procedures.core import units
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, check, significance, verdict
-from procedures.core.recording import AXES, Recording
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.recording import AXES, TRIADS, Recording
 from procedures.core.report import Report
 from procedures.core.site import Site
 from procedures.core.unit import Unit
-from procedures.parameters import Parameters
+from procedures.parameters import Parameters, planned_tests
 from procedures.procedure import Outcome
 from procedures.reports import calibration as pictures
 from procedures.reports import whole_turns as of_turns
@@ -33,6 +33,17 @@ class FerrarisLimits(Parameters):
     condition_max: float = Field(
         100.0, ge=1.0, le=1e9, description="largest condition number of the accelerometers' design"
     )
+
+    @property
+    def of_scale(self) -> Limit:
+        """Limit of the gyros' scale factors, with its source."""
+        most = self.gyro_scale_3_sigma_ppm
+        return Limit("ppm", maximum=most, source=self.source_of("gyro_scale_3_sigma_ppm"))
+
+    @property
+    def level_source(self) -> str:
+        """Source of the level of the residuals' tests."""
+        return self.source_of("residual_p_value_min", SIGNIFICANCE)
 
 
 class Result(Outcome):
@@ -81,23 +92,28 @@ def report(result: Result) -> Report:
 RESIDUALS = "residuals, p-value of chi-square"
 
 
+def planned_residuals(limits: FerrarisLimits, unit: Unit) -> tuple[PlannedCheck, ...]:
+    """Return the planned tests of the residuals of triads whose noise is known."""
+    known = [triad for triad in TRIADS if unit.triad(triad) is not None]
+    return planned_tests(limits, "residual_p_value_min", *(f"{triad} {RESIDUALS}" for triad in known))
+
+
 def _gyro_checks(found: WholeTurns, limits: FerrarisLimits) -> list[Check]:
-    limit = Limit("ppm", maximum=limits.gyro_scale_3_sigma_ppm, source="ours")
+    sd_ppm = [found.coefficient(f"K{k}{k}").standard_uncertainty / units.PPM for k in (1, 2, 3)]
     checks = [
-        check(
-            f"gyro scale factor {axis}, 3σ", 3.0 * found.coefficient(f"K{k}{k}").standard_uncertainty / units.PPM, limit
-        )
-        for k, axis in enumerate(AXES, start=1)
+        check(f"gyro scale factor {axis}, 3σ", 3.0 * sd, limits.of_scale) for axis, sd in zip(AXES, sd_ppm, strict=True)
     ]
     if found.p_value is not None:
-        checks.append(significance(f"gyro {RESIDUALS}", found.p_value, limits.residual_p_value_min))
+        name, level = f"gyro {RESIDUALS}", limits.residual_p_value_min
+        checks.append(significance(name, found.p_value, level, source=limits.level_source))
     return checks
 
 
 def _force_checks(found: TriadSummary, limits: FerrarisLimits) -> list[Check]:
-    checks = [check("accelerometer condition number", found.condition, Limit("1", maximum=limits.condition_max))]
+    most = Limit("1", maximum=limits.condition_max, source=limits.source_of("condition_max"))
+    checks = [check("accelerometer condition number", found.condition, most)]
     checks.append(own_axis_check("accelerometer", found.calibration.matrix_array))
     if found.p_value is not None:
         level, note = limits.residual_p_value_min, found.residual_note
-        checks.append(significance(f"accelerometer {RESIDUALS}", found.p_value, level, note))
+        checks.append(significance(f"accelerometer {RESIDUALS}", found.p_value, level, note, limits.level_source))
     return checks

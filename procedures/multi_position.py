@@ -13,7 +13,6 @@ from pydantic import Field
 
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.extra_terms import ExtraFit, Kind, TermEstimate, fit_terms, require_terms, terms_of
-from procedures.analysis.calibration.misfit import MISFIT_MAX
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
@@ -22,22 +21,22 @@ from procedures.analysis.calibration.station_means import StationMeans, launch_w
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.calibration.triad_analysis import analyse_inputs, brought_by_unit, noise_of_means, suspected
-from procedures.analysis.orientation_plan.requirements import IN_RUN_SOURCE
-from procedures.analysis.own_axes import OWN_AXES, own_axis_check
+from procedures.analysis.own_axes import OWN_AXES
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
-from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, triad_calibration
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import Check, PlannedCheck, verdict
 from procedures.core.recording import Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
 from procedures.dwells import saved_tables
-from procedures.procedure import JudgedParameters, Outcome, PredictedUncertainty
+from procedures.parameters import JudgedParameters, planned_tests
+from procedures.procedure import Outcome, PredictedUncertainty
 from procedures.reports import calibration as pictures
+from procedures.triad_checks import RESIDUALS, fit_checks
 
 TriadName = Literal["accelerometer", "gyro"]
 ACCELEROMETER_TERMS: tuple[Kind, ...] = ("quadratic", "asymmetry")
@@ -199,8 +198,15 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 
 def quantities(params: FitParameters) -> tuple[str, ...]:
     """Return the names of the checks and coefficients that a result will have."""
-    checks = (" condition number", OWN_AXES, " residuals, p-value of chi-square")
+    checks = (" condition number", OWN_AXES, f" {RESIDUALS}")
     return tuple(f"{triad}{n}" for triad in params.triads for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
+
+
+def planned_residuals(params: FitParameters, triads: Sequence[str]) -> tuple[PlannedCheck, ...]:
+    """Return the planned tests of the residuals of triads whose noise is known."""
+    return planned_tests(
+        params, "residual_p_value_min", *(f"{triad} residuals, p-value of chi-square" for triad in triads)
+    )
 
 
 def report(result: Result) -> Report:
@@ -228,50 +234,11 @@ def _of(extended: Sequence[Extended], summary: TriadSummary) -> Extended | None:
     return next((e for e in extended if e.calibration.triad == summary.calibration.triad), None)
 
 
-def triad_checks(
-    t: TriadSummary, in_run_maximum: float, condition_max: float, residual_p_value_min: float
-) -> list[Check]:
-    """Return the checks of a triad's calibration: error per axis in sample, condition, and residuals by p-value or
-    misfit.
-    """
-    triad, m = t.calibration.triad, t.magnitudes
-    unit, size = units.DISPLAY[m.unit]
-    checks = [
-        check(
-            f"{triad} bias in run, δ/√3",
-            m.per_axis / size,
-            Limit(unit, maximum=in_run_maximum, source=IN_RUN_SOURCE),
-            m.per_axis_sd / size,
-            degrees_of_freedom=len(m.after) - 1.0,
-        ),
-        check(f"{triad} condition number", t.condition, Limit("1", maximum=condition_max)),
-    ]
-    checks.append(own_axis_check(triad, t.calibration.matrix_array))
-    if t.p_value is not None:
-        name = f"{triad} residuals, p-value of chi-square"
-        checks.append(significance(name, t.p_value, residual_p_value_min, t.residual_note))
-    elif t.misfit is not None:
-        limit = Limit("1", maximum=MISFIT_MAX, source="ours")
-        checks.append(
-            check(f"{triad} residuals over what noise and table allow", t.misfit, limit, note=f"worst: {t.worst}")
-        )
-    return checks
-
-
 def _checks(t: TriadSummary, extended: Extended | None, params: FitParameters) -> list[Check]:
-    triad = t.calibration.triad
-    condition = t.condition if extended is None else extended.condition
-    checks = [check(f"{triad} condition number", condition, Limit("1", maximum=params.condition_max))]
-    checks.append(own_axis_check(triad, (extended or t).calibration.matrix_array))
-    p_value = t.p_value if extended is None else extended.p_value
-    if p_value is not None:
-        name = f"{triad} residuals, p-value of chi-square"
-        checks.append(significance(name, p_value, params.residual_p_value_min, t.residual_note))
-    elif t.misfit is not None and extended is None:
-        limit = Limit("1", maximum=MISFIT_MAX, source="ours")
-        name = f"{triad} residuals over what noise and positions allow"
-        checks.append(check(name, t.misfit, limit, note=f"worst: {t.worst}"))
-    return checks
+    of = extended or t
+    misfit = t.misfit if extended is None else None
+    of_fit = (of.condition, of.calibration.matrix_array, of.p_value, misfit)
+    return fit_checks(t, *of_fit, params, "noise and positions")
 
 
 def _unknown_noise(summaries: Sequence[TriadSummary]) -> tuple[str, ...]:

@@ -12,7 +12,17 @@ from procedures.analysis.launch.prediction import predicted_noise
 from procedures.analysis.launch.results import ChannelNoise, LaunchNoise
 from procedures.analysis.launch.summary import ChannelSummary
 from procedures.core import units
-from procedures.core.limits import Check, Limit, PlannedCheck, asked_limit, check, significance, upper_bound
+from procedures.core.limits import (
+    ASKED,
+    Check,
+    Limit,
+    PlannedCheck,
+    asked_limit,
+    check,
+    significance,
+    source_of,
+    upper_bound,
+)
 from procedures.core.recording import TRIADS
 from procedures.core.unit import Unit
 from procedures.parameters import Parameters
@@ -79,8 +89,8 @@ LIMITED = (
 """Triad, process, unit of its limit, size of that unit in SI, and the field of the limit."""
 TRIAD_OF = {"rad/s": "gyro", "m/s^2": "accelerometer"}
 """Unit of a channel's rate -> its triad; channels in counts are held to no limit."""
-READY, BASE = "thesis table 1.4, 4.1.2", "ours: base vibration"
-ABSENCE = "thesis 4.1.2: their absence is a sign of quality"
+READY, READY_S = "thesis table 1.4, 4.1.2", 600.0
+ABSENCE, ABSENCE_LEVEL = "thesis 4.1.2: their absence is a sign of quality", 0.001
 SLOW = ("rate_random_walk", "rate_ramp")
 
 
@@ -149,7 +159,7 @@ def noise_checks(limits: NoiseLimits, unit: Unit, duration_s: float, launches: i
     if limits.absence_level is not None:
         names = [c.name for c in unit.channels if c.rate_unit in ("rad/s", "m/s^2")]
         level = limits.absence_level / (2 * max(1, len(names)))
-        limit = Limit("1", minimum=level, source=ABSENCE)
+        limit = Limit("1", minimum=level, source=source_of(limits.absence_level, ABSENCE_LEVEL, ABSENCE))
         found += [PlannedCheck(_absent(name, slow), limit, level=level) for name in names for slow in SLOW]
     return found
 
@@ -179,7 +189,7 @@ def surroundings_checks(
         of_launches = [launch.channels[index] for launch in launches]
         name, ends = s.channel, [c.warm_up for c in of_launches if c.warm_up is not None]
         if limits.readiness_s is not None and s.rate_unit != "count":
-            limit = Limit("s", maximum=limits.readiness_s, source=READY)
+            limit = asked_limit("s", limits.readiness_s, READY_S, READY)
             if ends:
                 last = max(ends, key=lambda w: w.end_s)
                 note = "" if last.has_ended else "it has not ended within the launch: extrapolated"
@@ -187,12 +197,15 @@ def surroundings_checks(
             else:
                 found.append(check(f"{name} readiness time", 0.0, limit, note="no warm-up was found"))
         if limits.absence_level is not None:
-            level = limits.absence_level / (2 * len(channels))
+            source, level = (
+                source_of(limits.absence_level, ABSENCE_LEVEL, ABSENCE),
+                limits.absence_level / (2 * len(channels)),
+            )
             for process in SLOW:
                 p_values = [c.coefficient(process).likelihood.p_value for c in of_launches]
                 least = min((p for p in p_values if p is not None), default=1.0)
                 value = min(1.0, len(p_values) * least)  # Bonferroni: several launches, one chance
-                found.append(significance(_absent(name, process), value, level, source=ABSENCE))
+                found.append(significance(_absent(name, process), value, level, source=source))
         found += _vibration(name, s.rate_unit, of_launches, limits)
     return found
 
@@ -203,4 +216,4 @@ def _vibration(name: str, rate_unit: str, launches: Sequence[ChannelNoise], limi
     if maximum is None or not seen:
         return []
     unit, size = ("deg/h", units.DEG_PER_HOUR) if rate_unit == "rad/s" else ("m/s^2", 1.0)
-    return [check(f"{name} base vibration, rms", max(seen) / size, Limit(unit, maximum=maximum, source=BASE))]
+    return [check(f"{name} base vibration, rms", max(seen) / size, Limit(unit, maximum=maximum, source=ASKED))]

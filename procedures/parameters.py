@@ -1,4 +1,4 @@
-"""Bases of parameter models, and the decision rules that every verdict follows."""
+"""Bases of parameter models, checks that follow from them alone, and the decision rules of every verdict."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self
@@ -6,7 +6,7 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from procedures.core.errors import BadParameter
-from procedures.core.limits import COVERAGE, Rule, RuleName
+from procedures.core.limits import COVERAGE, OURS, SIGNIFICANCE, Limit, PlannedCheck, Rule, RuleName, source_of
 
 
 class Parameters(BaseModel):
@@ -17,6 +17,24 @@ class Parameters(BaseModel):
     def filled(self, defaults: Mapping[str, Any]) -> Self:
         """Return the parameters with each None replaced by its default, where there is one."""
         return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
+
+    def source_of(self, limit: str, own: str = OURS) -> str:
+        """Return the source of the limit in this field: `own` for the field's default, the request for other values."""
+        return source_of(getattr(self, limit), type(self).model_fields[limit].default, own)
+
+
+def planned_tests(params: Parameters, field: str, *checks: str) -> tuple[PlannedCheck, ...]:
+    """Return planned tests of significance, each at the level in this field; none where the level is zero or null."""
+    level: float | None = getattr(params, field)
+    if not level:
+        return ()
+    limit = Limit("1", minimum=level, source=params.source_of(field, SIGNIFICANCE))
+    return tuple(PlannedCheck(name, limit, level=level) for name in checks)
+
+
+def largest(params: Parameters, field: str, unit: str, source: str = OURS) -> Limit:
+    """Return the largest value in this field as a limit; `source` is that of the field's default."""
+    return Limit(unit, maximum=getattr(params, field), source=params.source_of(field, source))
 
 
 class DecisionRules(Parameters):
@@ -51,6 +69,18 @@ class JudgedParameters(Parameters):
         None,
         exclude_if=lambda rules: rules is None,
         description="how values are held to their limits; None: simple acceptance, U at 95.45 %",
+    )
+
+
+class SupplyParameters(Parameters):
+    """The voltage of the unit's supply, of procedures that test a unit at other voltages than the nominal one."""
+
+    supply_voltage_v: float | None = Field(
+        None,
+        gt=0.0,
+        le=1000.0,
+        exclude_if=lambda voltage: voltage is None,
+        description="of the unit's supply, set before the unit is switched on; None: the bench's nominal voltage",
     )
 
 

@@ -204,6 +204,10 @@ def _nothing_learnt(_: Any, unit: Unit, _origin: str) -> Unit:
     return unit
 
 
+def _no_averaging_time(_params: Any, _context: Context) -> float | None:
+    return None
+
+
 @dataclass(frozen=True)
 class Procedure(Generic[P, R]):
     """A test procedure: the actions on the bench, and the analysis of the recordings.
@@ -234,6 +238,9 @@ class Procedure(Generic[P, R]):
     """Kinds of the unit's current corrections that the result rests on; those it has then belong to its lineage."""
     learns: Callable[[R, Unit, str], Unit] = _nothing_learnt
     """Function that updates the unit's record from a job's result; the text names that result as its origin."""
+    expected_averaging_time: Callable[[P, Context], float | None] = _no_averaging_time
+    """Averaging time that `learns` is expected to give the unit's record, for previews of what comes after [s]; None:
+    the present one stays, or nothing is known."""
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
     """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
     planned_checks: Callable[[P, Context], tuple[PlannedCheck, ...]] = _no_checks

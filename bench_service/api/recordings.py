@@ -22,6 +22,7 @@ from bench_service.formats.import_request import ImportFile
 from bench_service.formats.overview import overview
 from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal
+from bench_service.formats.samples_out.naming import file_stem
 from bench_service.jobs.numbers import job_id_of
 from bench_service.mapping import copied
 from bench_service.model.raw_data import RawState
@@ -153,7 +154,7 @@ def _part(
     service: BenchService, recording_id: str, names: list[str] | None, start_s: float | None, stop_s: float | None
 ) -> Extract:
     stored = service.stores.recordings.get(recording_id)
-    part = extract(stored.info, stored.dtype, names, start_s, stop_s)
+    part = extract(stored.info, stored.dtype, names, start_s, stop_s, stored.origin)
     require_samples(part, start_s, stop_s)
     return part
 
@@ -162,7 +163,7 @@ def _exported(service: BenchService, part: Extract, form: ExportFormat) -> Admit
     recordings, recording_id = service.stores.recordings, part.info.id
     require_undamaged(recordings, recording_id, part.start, part.stop)
     blocks = recordings.read(recording_id, [c.name for c in part.info.channels], part.start, part.stop)
-    file_name = f"{recording_id}.{form.value}"
+    file_name = f"{file_stem(part)}.{form.value}"
     return AdmittedStream(
         export(part, blocks, form),
         media_type=form.media_type,

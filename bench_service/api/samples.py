@@ -1,6 +1,6 @@
 """Routes that export samples for other tools: those of one recording, and those of a whole job as one zip."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, Any
@@ -20,6 +20,7 @@ from bench_service.formats.chunk import RAW_BYTES
 from bench_service.formats.export import Extract, extract, require_samples
 from bench_service.formats.samples_out.archive import archived
 from bench_service.formats.samples_out.mcap_file import BEGAN
+from bench_service.formats.samples_out.naming import file_stem
 from bench_service.formats.samples_out.sheet import LARGEST_FACTOR, Sheet, Treatment, physical_sheet, raw_sheet
 from bench_service.formats.samples_out.sheet_files import SheetFormat, written
 from bench_service.model.errors import NotFound
@@ -51,7 +52,12 @@ class Values(StrEnum):
 FileForm = Annotated[SheetFormat, Query(alias="format", description="feather is Arrow's file, arrow its stream")]
 Wanted = Annotated[Values, Query(description="physical: SI, increments over the sample period; raw: as stored")]
 CorrectedBy = Annotated[
-    str | None, Query(max_length=300, description="Ids of calibrations, separated by commas, at most one a triad")
+    str | None,
+    Query(
+        max_length=300,
+        description="Ids of calibrations, at most one a triad, and of temperature corrections, at most one of each "
+        "kind, which come first; separated by commas",
+    ),
 ]
 Decimate = Annotated[int, Query(ge=1, le=LARGEST_FACTOR, description="Samples that one mean is taken over")]
 
@@ -80,14 +86,15 @@ async def read_samples(
     """
     names = None if channels is None else channels.split(",")
 
-    def begun() -> Iterator[bytes]:
+    def begun() -> tuple[str, Iterator[bytes]]:
         stored = service.stores.recordings.get(recording_id)
         treatment = treatment_of(service.stores, stored.info.unit, corrected_by, decimate)
-        part = extract(stored.info, stored.dtype, names, start_s, stop_s)
+        part = extract(stored.info, stored.dtype, names, start_s, stop_s, stored.origin)
         require_samples(part, start_s, stop_s)
-        return written(_dated(stored, _sheet(service, part, values, treatment)), form)
+        file_name = f"{_stem(part, values, treatment)}.{form.value}"
+        return file_name, written(_dated(stored, _sheet(service, part, values, treatment)), form)
 
-    return await _admitted(begun, form, "application/octet-stream", f"{recording_id}.{form.value}")
+    return await _admitted(begun, form, "application/octet-stream")
 
 
 @router.get(
@@ -106,23 +113,29 @@ async def read_samples_of_job(
 ) -> StreamingResponse:
     """Stream all complete recordings of a job as one zip, with a manifest that has the SHA-256 of each file."""
 
-    def begun() -> Iterator[bytes]:
+    def begun() -> tuple[str, Iterator[bytes]]:
         job = service.stores.jobs.get(job_id)
         stored = service.stores.recordings.of_job(job_id)
         if not stored:
             raise NotFound("recording", job_id, "the job has no complete recording")
-        parts = [extract(one.info, one.dtype) for one in stored]
+        parts = [extract(one.info, one.dtype, origin=one.origin) for one in stored]
         treatments = [treatment_of(service.stores, part.info.unit, corrected_by, decimate) for part in parts]
         asked = zip(stored, parts, treatments, strict=True)
         made = [_dated(one, _sheet(service, part, values, how)) for one, part, how in asked]
         files = [
-            (f"{number:03d}-{one.info.id}.{form.value}", written(sheet, form), _facts(one, sheet))
-            for number, (one, sheet) in enumerate(zip(stored, made, strict=True), start=1)
+            (f"{number:03d}-{_stem(part, values, how)}.{form.value}", written(sheet, form), _facts(one, sheet))
+            for number, (one, part, how, sheet) in enumerate(zip(stored, parts, treatments, made, strict=True), start=1)
         ]
         about = {"job": job.id, "procedure": job.procedure, "unit": job.unit, "values": values.value}
-        return archived(files, about)
+        return f"{job_id}-{values.value}.zip", archived(files, about)
 
-    return await _admitted(begun, form, "application/zip", f"{job_id}.zip")
+    return await _admitted(begun, form, "application/zip")
+
+
+def _stem(part: Extract, values: Values, treatment: Treatment) -> str:
+    """Name of a file of samples without its ending, which tells how they were treated."""
+    how = [values.value, *(["corrected"] if treatment.calibrations or treatment.corrections else [])]
+    return file_stem(part, *how, *([f"means{treatment.decimate}"] if treatment.decimate > 1 else []))
 
 
 def _sheet(service: BenchService, part: Extract, values: Values, treatment: Treatment) -> Sheet:
@@ -145,22 +158,29 @@ def _dated(one: StoredRecording, sheet: Sheet) -> Sheet:
 
 
 def _facts(one: StoredRecording, sheet: Sheet) -> dict[str, Any]:
-    """Facts of a file in a manifest: those of the recording, and the unit of each column."""
-    units = {column.name: column.attributes["unit"] for column in sheet.columns}
+    """Facts of a file in a manifest: those of the recording, its columns, and the unit of each column's numbers."""
+    units = {column.name: column.unit_of_numbers for column in sheet.columns}
     return {
         "recording_facts": dict(sheet.about),
         "rows": sheet.rows,
         "units": units,
+        "columns": [{"name": column.name, **column.attributes} for column in sheet.columns],
         "channels": len(one.info.channels),
     }
 
 
-async def _admitted(begun: Any, form: SheetFormat, media_type: str, name: str) -> StreamingResponse:
-    """A stream that has its place among heavy requests; what is refused is refused before its first byte."""
+async def _admitted(
+    begun: Callable[[], tuple[str, Iterator[bytes]]], form: SheetFormat, media_type: str
+) -> StreamingResponse:
+    """A stream that has its place among heavy requests; what is refused is refused before its first byte.
+
+    `begun`: returns the name of the file and its bytes.
+    """
     give_back = await place_in_turn(EXPORTS, RAW_BYTES * HELD.get(form, 8))
     try:
+        name, content = await to_thread.run_sync(begun)
         stream = AdmittedStream(
-            await to_thread.run_sync(begun),
+            content,
             media_type=media_type,
             headers={"Content-Disposition": f'attachment; filename="{name}"'},
         )

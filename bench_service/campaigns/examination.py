@@ -25,7 +25,7 @@ from bench_service.model.errors import NotFound
 from procedures.core.errors import BadParameter, DomainError, NoCalibration
 from procedures.core.limits import Limit, PlannedCheck
 from procedures.core.units import HOUR, converted
-from procedures.procedure import PredictedUncertainty
+from procedures.procedure import Context, PredictedUncertainty
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class Examiner:
         valid_parameters(method.params.model_validate, step.parameters, where)
         if method.calibrations is not NO_CALIBRATIONS:
             progress.calibrating.add(step.name)
-        params, record = method.params.model_validate(step.parameters), self._planner.context(unit, bench).unit
+        params, record = method.params.model_validate(step.parameters), self._context(unit, bench, progress).unit
         checks = method.planned_checks(params, record, progress.predicted_uncertainties_of(step.calibrations_of))
         limits = tuple(_previews(checks, params))
         coarse = (
@@ -168,20 +168,27 @@ class Examiner:
         )
         return StepPlan(step.name, step.does, warnings=tuple(coarse), limits=limits)
 
+    def _context(self, unit: str, bench: str | None, progress: Progress) -> Context:
+        """The unit with the record that earlier steps are expected to leave, and the bench."""
+        context = self._planner.context(unit, bench)
+        return replace(context, unit=progress.record(context.unit))
+
     def _foreseen(self, step: Step, unit: str, bench: str | None, progress: Progress) -> tuple[Plan, tuple[str, ...]]:
         """The plan on the unit as earlier steps will leave it, as far as that is known, and what is not, in words."""
-        context, parameters, unknown = self._planner.context(unit, bench), step.parameters, ()
+        context, parameters, unknown = self._context(unit, bench, progress), step.parameters, ()
         wanted = parameters.get("thermal_correction") == "current" and context.unit.thermal_correction is None
         if wanted and progress.correcting:
             parameters, unknown = {**parameters, "thermal_correction": "none"}, (_CORRECTED,)
         try:
-            return self._planner.plan_in(context, step.does, parameters), unknown
+            plan = self._planner.plan_in(context, step.does, parameters)
         except NoCalibration:
             expected = progress.expected(context.unit) if progress.calibrated else None
             if expected is None:
                 raise
             plan = self._planner.plan_in(replace(context, unit=expected), step.does, parameters)
-            return plan, (*unknown, _EXPECTED)
+            unknown = (*unknown, _EXPECTED)
+        stored_s = self._planner.context(unit, bench).unit.averaging_time_s
+        return plan, (*unknown, *_of_averaging_time(plan, parameters, progress, stored_s))
 
     def _planned(
         self, step: Step, where: str, plan: Plan, unknown: tuple[str, ...], progress: Progress, rule: DecisionRule
@@ -198,6 +205,9 @@ class Examiner:
             progress.planned[step.name] = prediction.uncertainties
         if procedure.corrections is not NO_CORRECTIONS:
             progress.correcting.add(step.name)
+        averaging_time_s = procedure.expected_averaging_time(plan.parameters, plan.context)
+        if averaging_time_s is not None:
+            progress.averaging_time_s, progress.averaging_time_of = averaging_time_s, step.name
         checks = _previews(procedure.planned_checks(plan.parameters, plan.context), plan.parameters)
         checks += [
             preview(_of_campaign(limit, prediction.uncertainties), rule_of(limit, rule)) for limit in step.limits
@@ -218,13 +228,27 @@ class Examiner:
         """The plan of a step whose calibration an earlier step is to give: stations, without a prediction."""
         if strict and not progress.calibrated:
             raise BadParameter(where, step.does, str(error)) from error
-        procedure, context = self._catalogue.procedure(step.does), self._planner.context(unit, bench)
+        procedure, context = self._catalogue.procedure(step.does), self._context(unit, bench, progress)
         params = procedure.resolve(procedure.params.model_validate(step.parameters), context)
         stations = stations_of(procedure, params)
         require_known(step, where, None if procedure.quantities is None else procedure.quantities(params, context))
         duration_s = sum(s.power_off_s + s.settle_s + s.record_s for s in stations)
         warning = "not predicted: the calibration that it uses is not there yet"
         return StepPlan(step.name, step.does, "", len(stations), duration_s, 0, (warning,))
+
+
+def _of_averaging_time(
+    plan: Plan, parameters: Mapping[str, Any], progress: Progress, stored_s: float
+) -> tuple[str, ...]:
+    """The sentence on an averaging time that an earlier step is to give, where the plan's parameters follow it."""
+    unit, procedure = plan.context.unit, plan.procedure
+    stored = replace(plan.context, unit=replace(unit, averaging_time_s=stored_s))
+    if procedure.resolve(procedure.params.model_validate(parameters), stored) == plan.parameters:
+        return ()
+    return (
+        f"predicted with the averaging time of {unit.averaging_time_s:g} s that step {progress.averaging_time_of} is "
+        f"expected to find, by the noise of the unit's record; that record has {stored_s:g} s until then",
+    )
 
 
 def _warnings(plans: Sequence[StepPlan]) -> list[str]:

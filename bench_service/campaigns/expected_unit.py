@@ -32,11 +32,19 @@ class Progress:
     """Steps whose results give calibrations."""
     correcting: set[str] = field(default_factory=set[str])
     """Steps whose results give corrections."""
+    averaging_time_s: float | None = None
+    """Averaging time that an earlier step is expected to give the unit's record; None: the record's own."""
+    averaging_time_of: str = ""
+    """The step that is to give it."""
     left_out: set[str] = field(default_factory=set[str])
     planned: dict[str, tuple[PredictedUncertainty, ...]] = field(
         default_factory=dict[str, tuple[PredictedUncertainty, ...]]
     )
     """Predicted uncertainties of the coefficients of each step that calibrates, by the name of the step."""
+
+    def record(self, unit: Unit) -> Unit:
+        """Return the unit with what earlier steps are expected to have entered into its record."""
+        return unit if self.averaging_time_s is None else replace(unit, averaging_time_s=self.averaging_time_s)
 
     def predicted_uncertainties_of(self, steps: Sequence[str]) -> tuple[tuple[PredictedUncertainty, ...], ...]:
         """Predicted uncertainties of the coefficients, one tuple per named step that has a prediction, in the order of

@@ -57,4 +57,5 @@ def _became_of(step: StepRun) -> str:
 
 def _sentence(check: Check) -> str:
     limit = check.limit
-    return f"{check.name} = {check.value:.4g}, limit {bounds(limit.minimum, limit.maximum, limit.unit)}"
+    value = "unbounded" if check.value is None else f"{check.value:.4g}"
+    return f"{check.name} = {value}, limit {bounds(limit.minimum, limit.maximum, limit.unit)}"

@@ -33,7 +33,8 @@ class Judgement:
 def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) -> Judgement:
     """Return the result's own verdict, made worse where the campaign's limits or trend rules are not met.
 
-    A limit on a quantity that the result lacks, or has in another kind of unit, is an error of the step.
+    A limit on a quantity that the result lacks, or has in another kind of unit, is an error of the step, unless a check
+    has failed: then it is a fail, and the reason names the limit.
     """
     own = checks_of(result.document)
     warnings = list(result.document.get("warnings", []))
@@ -52,7 +53,8 @@ def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) 
             continue
         added += judged
         warnings += said
-    worst = Verdict.ERROR if failures else _worst(result.verdict, own, added)
+    worst = _worst(result.verdict, own, added)
+    worst = Verdict.ERROR if failures and worst is not Verdict.FAIL else worst
     undecided = [f"{c.name} is inconclusive" for c in (*own, *added) if c.inconclusive]
     reasons = (*failures, *(undecided if worst is Verdict.ERROR else ()))
     return Judgement(worst, (*own, *added), tuple(warnings), "; ".join(reasons))

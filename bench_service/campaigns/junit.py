@@ -135,7 +135,9 @@ def _case(run: CampaignRun, step: StepRun, name: str) -> "TestCase":
 def _sentence(check: Check) -> str:
     """The value and its limit, as a sentence for a person."""
     limit = check.limit
-    value = f"{check.value:.6g}" if isfinite(check.value) else "no finite number"
+    value = "unbounded" if check.value is None else "no finite number"
+    if check.value is not None and isfinite(check.value):
+        value = f"{check.value:.6g}"
     uncertainty = "" if check.standard_uncertainty is None else f" ± {check.standard_uncertainty:.2g}"
     return f"{check.name} = {value}{uncertainty} {limit.unit}, limit {bounds(limit.minimum, limit.maximum, limit.unit)}"
 

@@ -123,10 +123,14 @@ class CampaignRun:
 
 
 def verdict_of(run: CampaignRun) -> Verdict:
-    """Return the run's verdict: error where a step gave none or nothing was judged, fail where one failed, else
-    pass.
+    """Return the run's verdict: fail where any step failed, else error where a step gave none or nothing was judged,
+    else pass.
+
+    A step that was not judged, or whose checks are inconclusive, takes nothing back of what another step has found.
     """
     verdicts = [step.verdict for step in run.steps if step.state is not StepState.SKIPPED]
+    if Verdict.FAIL in verdicts:
+        return Verdict.FAIL
     if not verdicts or any(v is None or v is Verdict.ERROR for v in verdicts):
         return Verdict.ERROR
-    return Verdict.FAIL if Verdict.FAIL in verdicts else Verdict.PASS
+    return Verdict.PASS

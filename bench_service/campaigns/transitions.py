@@ -122,17 +122,25 @@ def cancelled(run: CampaignRun, at: datetime) -> CampaignRun:
 
 
 def out_of_time(run: CampaignRun, at: datetime) -> CampaignRun:
-    """Return the run ended because its window has closed: unfinished steps are skipped, and the verdict is error."""
+    """Return the run ended because its window has closed: unfinished steps are skipped; the verdict is error, or fail
+    where a step has failed.
+    """
     why = f"the window of {run.campaign.window_h:g} h has closed"
     return ended(_skipped(run, why), at, why)
 
 
 def ended(run: CampaignRun, at: datetime, reason: str = "") -> CampaignRun:
-    """Return the ended run with its verdict; a `reason` for an early end makes it an error by itself."""
-    verdict = Verdict.ERROR if reason else verdict_of(run)
-    if verdict is Verdict.ERROR and not reason:
-        without = [s.name for s in run.steps if s.verdict in (None, Verdict.ERROR) and s.state is not StepState.SKIPPED]
-        reason = f"no verdict from {', '.join(without)}" if without else "no step was done: nothing was judged"
+    """Return the ended run with its verdict. A `reason` for an early end, or a step without a verdict, makes it an
+    error unless a step has failed: the unit then has failed, and the reason stands beside it.
+    """
+    verdict = verdict_of(run)
+    without = [s.name for s in run.steps if s.verdict in (None, Verdict.ERROR) and s.state is not StepState.SKIPPED]
+    if reason and verdict is not Verdict.FAIL:
+        verdict = Verdict.ERROR
+    if without and not reason:
+        reason = f"no verdict from {', '.join(without)}"
+    elif verdict is Verdict.ERROR and not reason:
+        reason = "no step was done: nothing was judged"
     state = JobState.FAILED if verdict is Verdict.ERROR else JobState.SUCCEEDED
     return _next(run, state=state, verdict=verdict, finished_at=at, waiting="", reason=reason)
 

@@ -20,6 +20,7 @@ from bench_service.cli.groups import (
     corrections,
     database,
     evidence,
+    exporting,
     importing,
     jobs,
     manual,
@@ -60,7 +61,7 @@ PANELS = {
     "Jobs": (plans.procedures, plans.preview, jobs.run, jobs.jobs),
     "Evidence": (
         evidence.recordings,
-        evidence.export,
+        exporting.export,
         importing.synthesise,
         plans.methods,
         evidence.analyse,

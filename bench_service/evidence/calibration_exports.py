@@ -103,6 +103,7 @@ def _triad(stores: EvidenceStores, one: StoredCalibration) -> TriadExport:
         valid_until=_text(one.valid_until),
         temperature_c=None if made_by is None else _temperature(stores, made_by),
         lineage=None if made_by is None else _lineage(made_by),
+        mounting=None if made_by is None else made_by.context.get("mounting"),
     )
 
 

@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from math import isfinite
 
 from bench_service.mapping import copied
+from bench_service.model.errors import NotFound
 from bench_service.model.quantities import Quantity, quantity
 from bench_service.model.records import ResultValue, StoredResult
 from procedures.analysis.control_chart import LEAST_POINTS, ControlLimits, Signal, control_limits, signals
@@ -56,8 +58,12 @@ def trend_of(values: Sequence[ResultValue], unit: str, procedure: str, name: str
 
 
 def value_of(result: StoredResult, name: str) -> ResultValue:
-    """Return the value of a quantity from one result. Raises `NotFound`, naming the known quantities."""
+    """Return the value of a quantity from one result. Raises `NotFound`, naming the known quantities, and for one that
+    nothing bounds.
+    """
     found = quantity(result.document, name)
+    if not isfinite(found.value):
+        raise NotFound("quantity", name, "it was not observed and is unbounded in this result: there is no value")
     about = {"result": result.id, "job": result.job_id, "at": result.created_at}
     return copied(ResultValue, result, **about, quantity=found)
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from bench_service.formats.chunk import RAW_BYTES, arrow_array, sample_type
+from bench_service.formats.samples_out.distinct_names import distinct
 from bench_service.formats.samples_out.written_bytes import WrittenBytes
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
@@ -54,6 +55,10 @@ class Extract:
     stop: int
     dtype: str
     """Sample type, "int32" or "float64"."""
+    of_channels: tuple[str, ...] = ()
+    """Names of all channels of the recording."""
+    origin: str = ""
+    """Origin of the recording: real, mixed, simulated, synthetic or imported; empty: not known."""
 
 
 def extract(
@@ -62,9 +67,10 @@ def extract(
     channels: Iterable[str] | None = None,
     start_s: float | None = None,
     stop_s: float | None = None,
+    origin: str = "",
 ) -> Extract:
     """Return a part of a recording, by names of channels and by time since its first sample [s]; a sample belongs to
-    its beginning.
+    its beginning. `origin` travels with it.
 
     Raises `MissingChannel`, `BadParameter`.
     """
@@ -76,7 +82,8 @@ def extract(
     last = info.count if stop_s is None else _sample(info, "stop_s", stop_s)
     if last < first:
         raise BadParameter("stop_s", stop_s, f"not before start_s = {start_s}")
-    return Extract(replace(info, channels=chosen), first, last, dtype)
+    everything = tuple(c.name for c in info.channels)
+    return Extract(replace(info, channels=chosen), first, last, dtype, everything, origin)
 
 
 def require_samples(part: Extract, start_s: float | None, stop_s: float | None) -> None:
@@ -126,8 +133,10 @@ def describe(part: Extract) -> dict[str, str]:
         "start_s": repr(info.start_s + part.start / info.rate_hz),
         "station": "" if info.station is None else info.station.label,
         "simulated": str(info.simulated).lower(),
+        "origin": part.origin or ("simulated" if info.simulated else "not known"),
         "content_hash_of_whole_recording": info.content_hash,
         "samples_of_whole_recording": str(info.count),
+        "channels_of_whole_recording": ",".join(part.of_channels or [c.name for c in info.channels]),
     }
 
 
@@ -201,15 +210,15 @@ def _csv(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
         f"# channel {c.name}: quantity={c.quantity.value} unit={c.unit} scale={c.scale!r} offset={c.offset!r}"
         for c in part.info.channels
     ]
-    names = [channel.name for channel in part.info.channels]
-    yield ("\n".join([*lines, ",".join(["time_s", *names])]) + "\n").encode()
+    names = distinct(["time_s", *(channel.name for channel in part.info.channels)])
+    yield ("\n".join([*lines, ",".join(names)]) + "\n").encode()
     options = csv.WriteOptions(include_header=False, quoting_style="none")
     sample = part.start
     for block in blocks:
         time_s = np.arange(sample, sample + len(block)) / part.info.rate_hz
-        columns = [arrow_array(time_s), *(arrow_array(block[:, i]) for i in range(len(names)))]
+        columns = [arrow_array(time_s), *(arrow_array(block[:, i]) for i in range(block.shape[1]))]
         sink = pa.BufferOutputStream()
-        csv.write_csv(pa.Table.from_arrays(columns, names=["time_s", *names]), sink, options)
+        csv.write_csv(pa.Table.from_arrays(columns, names=names), sink, options)
         yield sink.getvalue().to_pybytes()
         sample += len(block)
 

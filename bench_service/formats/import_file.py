@@ -17,7 +17,7 @@ from bench_service.formats.clock.judgement import ClockFindings
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.import_request import ImportFile
 from bench_service.formats.joined_files import Opened, in_order, joined, opened_files, surveyed
-from bench_service.formats.own_export import own_export
+from bench_service.formats.own_exports.recognition import provenance
 from bench_service.formats.rebuild import Rebuild
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Channel, RawArray
@@ -59,15 +59,21 @@ def read_import(files: Sequence[ImportFile], description: ImportDescription) -> 
         raise BadParameter("channels.file", sorted(used), f"every one of the {len(files)} files, numbered from 0")
     prints = [_fingerprint(file.stream) for file in files]
     bounds = Bounds.of(sum(int(p["bytes"]) for p in prints))
-    description, kept = _as_it_was(files, description)
     opened = opened_files(files, description.format)
+    said = provenance(opened)
+    if said.simulated:  # whatever the description says
+        description = description.model_copy(update={"simulated": True})
     findings = surveyed(opened, description, bounds)
     second, doubts = _second_clock(opened, description, bounds)
     source: dict[str, Any] = {
         "files": [{"name": file.name, **p} for file, p in zip(files, prints, strict=True)],
         "description": description.declared(),
-        "warnings": [*kept, *_said_by_logs(opened), *findings.warnings, *doubts],
+        "warnings": [*said.warnings, *_said_by_logs(opened), *findings.warnings, *doubts],
     }
+    if said.exports:
+        source["exports"] = list(said.exports)
+    if said.origin is not None:
+        source["origin"] = said.origin
     if findings.clock is not None:
         source["clock"] = findings.clock.document
         source["rate_of_time_column_hz"] = findings.clock.rate_hz
@@ -84,19 +90,6 @@ def read_import(files: Sequence[ImportFile], description: ImportDescription) -> 
         _clock=findings.clock,
         _bounds=bounds,
     )
-
-
-def _as_it_was(
-    files: Sequence[ImportFile], description: ImportDescription
-) -> tuple[ImportDescription, tuple[str, ...]]:
-    """Keep an exported recording simulated where it was, whatever the description says."""
-    if description.simulated:
-        return description, ()
-    found = [file.name for file in files if (own := own_export(file.stream)) is not None and own.simulated]
-    if not found:
-        return description, ()
-    words = f"{found[0]} is an export of a simulated recording: what comes of it stays marked as simulated"
-    return description.model_copy(update={"simulated": True}), (words,)
 
 
 def _said_by_logs(opened: Sequence[Opened]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 from bench_service.model.errors import NotFound
@@ -10,7 +10,9 @@ from bench_service.model.errors import NotFound
 
 @dataclass(frozen=True)
 class Quantity:
-    """A value of a result; the unit is empty where the document does not give it (a JSON pointer)."""
+    """A value of a result; the unit is empty where the document does not give it (a JSON pointer). One of infinity is
+    the bound of what a record does not bound.
+    """
 
     name: str
     value: float
@@ -27,7 +29,7 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     found = {
         check["name"]: Quantity(
             check["name"],
-            check["value"],
+            inf if check["value"] is None else check["value"],
             check["limit"]["unit"],
             check.get("standard_uncertainty"),
             check.get("bound", False),

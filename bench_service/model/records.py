@@ -72,6 +72,14 @@ class StoredRecording:
     """Origin of an imported recording: file name, its SHA-256, reader, declared reference values."""
 
     @property
+    def origin(self) -> str:
+        """Origin of its samples: real, mixed, simulated, synthetic or imported."""
+        stated = self.source.get("origin")
+        if stated:
+            return str(stated)
+        return "simulated" if self.info.simulated else "imported" if self.source.get("files") else "real"
+
+    @property
     def file_name(self) -> str:
         """Name of the first file of an imported recording; empty: it was recorded on a bench."""
         return next((str(file.get("name", "")) for file in self.source.get("files") or ()), "")

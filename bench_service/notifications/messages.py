@@ -7,7 +7,7 @@ from bench_service.campaigns.run import CampaignRun
 from bench_service.model.job import Event, Job
 from bench_service.model.records import BenchStop
 from bench_service.notifications.targets import EventKind
-from procedures.core.limits import Verdict
+from procedures.core.limits import Check, Verdict
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,10 @@ def of_stop(stop: BenchStop) -> Message:
     )
 
 
+def _value_of(check: Check) -> str:
+    return "unbounded" if check.value is None else f"= {check.value:.6g} {check.limit.unit}"
+
+
 def of_run(run: CampaignRun, at: datetime) -> Message | None:
     """Make the message about a campaign run that ended otherwise than with a pass; None for a run that passed or goes
     on.
@@ -59,7 +63,7 @@ def of_run(run: CampaignRun, at: datetime) -> Message | None:
         return None
     outcome = run.state.value if run.verdict is None else run.verdict.value
     missed = [
-        f"{step.name}: {check.name} = {check.value:.6g} {check.limit.unit}{' (inconclusive)' * check.inconclusive}"
+        f"{step.name}: {check.name} {_value_of(check)}{' (inconclusive)' * check.inconclusive}"
         for step in run.steps
         for check in step.checks
         if not check.passed

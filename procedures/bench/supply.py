@@ -72,7 +72,8 @@ class Supply(Device, Protocol):
         ...
 
     async def switch_on(self) -> None:
-        """Switch the output on, at the limits' nominal values unless `set_output` has set others.
+        """Switch the output on, at the limits' nominal values unless `set_output` has set others since the bench was
+        made safe.
 
         Raises `DeviceFault` where a protection has tripped, `Disconnected`.
         """
@@ -89,5 +90,7 @@ class Supply(Device, Protocol):
         ...
 
     async def make_safe(self) -> None:
-        """Switch the unit's power off; returns once it reads back as off. Raises `Disconnected`."""
+        """Switch the unit's power off; returns once it reads back as off. Settings of `set_output` are forgotten: the
+        next switching on is at the nominal values. Raises `Disconnected`.
+        """
         ...

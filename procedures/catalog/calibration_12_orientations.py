@@ -41,14 +41,16 @@ from procedures.core import units
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, verdict
+from procedures.core.limits import SIGNIFICANCE, Limit, PlannedCheck, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.dwells import DwellParameters, expected_stations, saved_tables
-from procedures.multi_position import predicted, triad_checks
+from procedures.multi_position import predicted
+from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.site_parameters import TableParameters, declared_table
+from procedures.triad_checks import in_run_limit, triad_checks
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
@@ -77,7 +79,7 @@ class Limits(Parameters):
     )
 
 
-class Params(TableParameters, DwellParameters):
+class Params(TableParameters, DwellParameters, SupplyParameters):
     """Orientations, dwell, site and limits of the calibration. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle], ...] = Field(
@@ -143,6 +145,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.dwell_s,
             temperatures=params.thermal_correction == "current",
             until=params.until,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i, (beta, gamma) in enumerate(params.orientations)
     )
@@ -187,7 +190,9 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     )
     second, fit, share, doubts = analyse_accelerometers(recordings, site, uncertainty, accelerometer, settings)
     triads = suspected([first, (second, fit)])
-    checks = tuple(c for t in triads for c in _checks(t, params.limits))
+    checks = tuple(
+        c for t in triads for c in triad_checks(t, in_run_limit(t.calibration.triad, params.limits), params.limits)
+    )
     warnings = _warnings(params, plans) + launch_warnings(recordings) + doubts
     return Result(
         checks=checks,
@@ -213,12 +218,12 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
     """Return the planned checks of the error per axis δ/√3, in sample."""
     params = resolve(params, context)
-    limits = params.limits
-    maxima = {"gyro": limits.gyro_bias_in_run_deg_h, "accelerometer": limits.accelerometer_bias_in_run_m_s2}
-    level = limits.residual_p_value_min
-    name, limit = "residuals, p-value of chi-square", Limit("1", minimum=level, source="ours: a test of significance")
-    plans = {triad: _plan(triad, params, context) for triad in TRIAD_NAMES}
-    found = [in_run_check(plan, maxima[triad], in_sample_covariance(plan)) for triad, plan in plans.items()]
+    level, source = params.limits.residual_p_value_min, params.limits.source_of("residual_p_value_min", SIGNIFICANCE)
+    name, limit = "residuals, p-value of chi-square", Limit("1", minimum=level, source=source)
+    found: list[PlannedCheck] = []
+    for triad in TRIAD_NAMES:
+        plan, in_run = _plan(triad, params, context), in_run_limit(triad, params.limits)
+        found.append(in_run_check(plan, in_run.maximum, in_sample_covariance(plan), source=in_run.source))
     return (*found, *(PlannedCheck(f"{triad} {name}", limit, level=level) for triad in TRIAD_NAMES))
 
 
@@ -281,12 +286,6 @@ def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
         if p.at_dwell() is None
     ]
     return tuple(w for w in (*found, *unknown) if w is not None)
-
-
-def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
-    gyro = t.calibration.triad == "gyro"
-    in_run = limits.gyro_bias_in_run_deg_h if gyro else limits.accelerometer_bias_in_run_m_s2
-    return triad_checks(t, in_run, limits.condition_max, limits.residual_p_value_min)
 
 
 PROCEDURE = Procedure(

@@ -29,7 +29,7 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import ASKED, SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import AXES, GYRO, Recording, Station
 from procedures.core.report import Report
 from procedures.procedure import (
@@ -222,7 +222,7 @@ RESIDUALS, SCATTER = "gyro {} residuals, p-value of chi-square", "scatter of the
 
 
 def _limit(unit: str, maximum: float | None = None, minimum: float | None = None) -> Limit:
-    return Limit(unit, maximum, minimum, "the job's")
+    return Limit(unit, maximum, minimum, ASKED)
 
 
 def quantities(params: Params, _context: Context) -> tuple[str, ...]:
@@ -242,7 +242,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
         name = DELAY.format(axis)
         if limits.delay_ms is not None and name in sd:
             made.append(PlannedCheck(name, _limit("ms", limits.delay_ms), 1e3 * sd[name]))
-        limit = Limit("1", minimum=level, source="ours: a test of significance")
+        limit = Limit("1", minimum=level, source=limits.source_of("residual_p_value_min", SIGNIFICANCE))
         made.append(PlannedCheck(RESIDUALS.format(axis), limit, level=level))
     return tuple(made)
 
@@ -263,7 +263,8 @@ def _checks(found: DynamicResponse, limits: Limits) -> tuple[Check, ...]:
                 sd_hz = c.bandwidth_standard_uncertainty_hz
                 made.append(check(BANDWIDTH.format(axis), c.bandwidth_hz, limit, sd_hz))
         if c.p_value is not None:
-            made.append(significance(RESIDUALS.format(axis), c.p_value, limits.residual_p_value_min))
+            name, source = RESIDUALS.format(axis), limits.source_of("residual_p_value_min", SIGNIFICANCE)
+            made.append(significance(name, c.p_value, limits.residual_p_value_min, source=source))
     if limits.stamp_scatter_ms is not None:
         made.append(check(SCATTER, 1e3 * found.stamp_scatter_s, _limit("ms", limits.stamp_scatter_ms)))
     return tuple(made)

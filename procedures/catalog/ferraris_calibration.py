@@ -29,7 +29,7 @@ from procedures.core import units
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import COEFFICIENT_NAMES
-from procedures.core.limits import Limit, PlannedCheck
+from procedures.core.limits import PlannedCheck
 from procedures.core.recording import AXES, Recording, Station
 from procedures.ferraris import FerrarisLimits, Result
 from procedures.multi_position import predicted
@@ -139,15 +139,13 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
     """Return the planned checks of the scale factors' uncertainty, by the plan, and of the residuals."""
     params = resolve(params, context)
     sd = {u.name: u.standard_uncertainty / units.PPM for u in _gyro(params, context, schedule(params))}
-    limit = Limit("ppm", maximum=params.limits.gyro_scale_3_sigma_ppm, source="ours")
-    level = params.limits.residual_p_value_min
-    test = Limit("1", minimum=level, source="ours: a test of significance")
+    limit = params.limits.of_scale
     scale = [
         PlannedCheck(f"gyro scale factor {axis}, 3σ", limit, None, None, 3.0 * sd[f"gyro.K{k}{k}"])
         for k, axis in enumerate(AXES, start=1)
         if sd
     ]
-    return (*scale, *(PlannedCheck(f"{t} {ferraris.RESIDUALS}", test, level=level) for t in ("gyro", "accelerometer")))
+    return (*scale, *ferraris.planned_residuals(params.limits, context.unit))
 
 
 PROCEDURE = Procedure(

@@ -35,10 +35,11 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import SIGNIFICANCE, Check, PlannedCheck, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
+from procedures.parameters import largest, planned_tests
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 from procedures.reports import repeated_alignment as pictures
 from procedures.site_parameters import TableParameters, declared_table
@@ -204,12 +205,27 @@ def _basis(context: Context) -> str:
     return f"Aligned with {context.unit.calibration_in_words(*TRIAD_NAMES)}"
 
 
+HEADING = "heading, expected standard uncertainty of one alignment"
+AS_PREDICTED = "errors as predicted, p-value of chi-square"
+
+
+def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
+    """Return the planned checks of the heading's uncertainty, and of the errors of each angle. Raises as `predict`."""
+    params = resolve(params, context)
+    site, stations, axes = params.site(context), schedule(params), context.bench.axis_motion
+    expected = expected_errors(planned_alignments(context.unit, site, params.table(site), stations, axes))
+    limit = largest(params.limits, "heading_sd_max_deg", "deg")
+    heading = PlannedCheck(HEADING, limit, expected=rms_deg(expected.of_angle(0)))
+    tests = (f"{angle} {AS_PREDICTED}" for angle in ANGLES)
+    known = expected.noise_known
+    return (heading, *(planned_tests(params.limits, "prediction_p_value_min", *tests) if known else ()))
+
+
 def _checks(angles: Sequence[AngleErrors], limits: Limits) -> tuple[Check, ...]:
-    most = Limit("deg", limits.heading_sd_max_deg, source="ours")
-    found = [check("heading, expected standard uncertainty of one alignment", angles[0].expected_sd_deg, most)]
-    level = limits.prediction_p_value_min
+    found = [check(HEADING, angles[0].expected_sd_deg, largest(limits, "heading_sd_max_deg", "deg"))]
+    level, source = limits.prediction_p_value_min, limits.source_of("prediction_p_value_min", SIGNIFICANCE)
     found += [
-        significance(f"{a.angle} errors as predicted, p-value of chi-square", a.p_value, level)
+        significance(f"{a.angle} {AS_PREDICTED}", a.p_value, level, source=source)
         for a in angles
         if a.p_value is not None
     ]
@@ -229,4 +245,6 @@ PROCEDURE = Procedure(
     analyse,
     report,
     uses_calibration=TRIAD_NAMES,
+    quantities=lambda _params, _context: (HEADING, *(f"{angle} {AS_PREDICTED}" for angle in ANGLES)),
+    planned_checks=planned_checks,
 )

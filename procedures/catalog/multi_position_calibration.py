@@ -17,10 +17,12 @@ from procedures.analysis.table_program.writing import THESIS_POSITIONS
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
+from procedures.core.limits import PlannedCheck
 from procedures.core.recording import Recording, Station
 from procedures.core.table_angles import TableAngles
 from procedures.dwells import DwellParameters, expected_stations
 from procedures.multi_position import FitParameters, Inputs, Result
+from procedures.parameters import SupplyParameters, largest
 from procedures.procedure import Context, Prediction, Procedure
 from procedures.site_parameters import TableParameters, declared_table
 
@@ -29,7 +31,7 @@ FOURTEEN = tuple(position[:3] for position in THESIS_POSITIONS[1:-1])
 """The rests of the thesis's program (appendix Д) without the home position at its beginning and end."""
 
 
-class Params(FitParameters, TableParameters, DwellParameters):
+class Params(FitParameters, TableParameters, DwellParameters, SupplyParameters):
     """Positions, dwell, site and fit; None takes the unit's or the bench's value, or the thesis's positions."""
 
     positions: tuple[tuple[Angle, Angle, Angle], ...] | None = Field(
@@ -80,6 +82,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.settle_s,
             dwell_s,
             until=params.until,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i, (a, dwell_s) in enumerate(rests)
     )
@@ -126,6 +129,15 @@ def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
     )
 
 
+def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
+    """Return the planned checks of each triad: its design's condition number, and its residuals."""
+    params = resolve(params, context)
+    limit = largest(params, "condition_max", "1")
+    conditions = [PlannedCheck(f"{triad} condition number", limit) for triad in params.triads]
+    known = [triad for triad in params.triads if context.unit.triad(triad) is not None]
+    return (*conditions, *multi_position.planned_residuals(params, known))
+
+
 PROCEDURE = Procedure(
     "multi_position_calibration",
     "Calibration in any positions",
@@ -140,4 +152,5 @@ PROCEDURE = Procedure(
     multi_position.report,
     multi_position.calibrations,
     quantities=lambda params, _: multi_position.quantities(params),
+    planned_checks=planned_checks,
 )

@@ -17,10 +17,11 @@ from procedures.analysis.turns.polarity import Answers, answers, sentences
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import AXES, TRIADS, Recording, Station
+from procedures.core.limits import ASKED, OURS, Check, Limit, PlannedCheck, check, verdict
+from procedures.core.recording import ACCELEROMETER, AXES, GYRO, TRIADS, Recording, Station
 from procedures.core.report import Report, Table
 from procedures.core.turn import Turn
+from procedures.parameters import largest
 from procedures.procedure import Context, JudgedParameters, Outcome, Parameters, Prediction, Procedure
 from procedures.table_motion import default_ramp_s, require_possible, require_rest, rest_with_demands
 
@@ -136,9 +137,25 @@ def _turn(params: Params) -> Turn:
         raise BadParameter("ramp_s", params.ramp_s, str(refusal)) from refusal
 
 
+def _limits(limits: Limits, relative: bool) -> tuple[Limit, Limit]:
+    """Limits of a channel's answer to its own axis and to others; `relative`: of one in counts."""
+    most = None if relative else limits.own_max
+    asked = ASKED in (limits.source_of("own_min"), OURS if relative else limits.source_of("own_max"))
+    own = Limit("1", most, limits.own_min, source=ASKED if asked else OURS)
+    return own, largest(limits, "other_max", "1")
+
+
+def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
+    """Return the planned checks of every channel: answers of 1 to its own axis and of 0 to others are nominal."""
+    made: list[PlannedCheck] = []
+    for channel in (c for c in context.unit.channels if c.name in GYRO + ACCELEROMETER):
+        own, other = _limits(params.limits, channel.rate_unit == "count")
+        made += (PlannedCheck(f"{channel.name}: {OWN}", own), PlannedCheck(f"{channel.name}: {OTHERS}", other))
+    return tuple(made)
+
+
 def _checks(found: Answers, limits: Limits) -> list[Check]:
-    own = Limit("1", None if found.relative else limits.own_max, limits.own_min, source="ours")
-    other = Limit("1", limits.other_max, source="ours")
+    own, other = _limits(limits, found.relative)
     wrong = wrong_axes(found.triad, found.axes)
     made: list[Check] = []
     for i, (name, axis, row) in enumerate(zip(TRIADS[found.triad], found.axes, found.matrix, strict=True)):
@@ -161,4 +178,5 @@ PROCEDURE = Procedure(
     analyse,
     report,
     quantities=quantities,
+    planned_checks=planned_checks,
 )

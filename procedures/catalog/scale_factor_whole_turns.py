@@ -25,10 +25,11 @@ from procedures.core import units
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.site import Site
+from procedures.parameters import largest, planned_tests
 from procedures.procedure import (
     Context,
     JudgedParameters,
@@ -45,6 +46,7 @@ from procedures.table_motion import default_ramp_s, require_possible, require_re
 
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
 TERM_SOURCE = "ours, after thesis 4.3"
+RESIDUALS = "gyro residuals, p-value of chi-square"
 REST_S = 2.0
 """Rest at the end of a recording where the table's demands take no time [s]."""
 
@@ -243,46 +245,51 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
         return ()
     deviations_ppm = (made.covariance.diagonal() ** 0.5 / units.PPM).tolist()
     sd = dict(zip(coefficient_names(params.terms), deviations_ppm, strict=True))
-    of_scale = Limit("ppm", maximum=params.limits.scale_factor_3_sigma_ppm, source="ours")
+    of_scale = largest(params.limits, "scale_factor_3_sigma_ppm", "ppm")
     found: list[PlannedCheck] = []
     for number, axis in enumerate(AXES, start=1):
         three = 3.0 * sd[f"K{number}{number}"]
         found.append(PlannedCheck(f"gyro scale factor {axis}, 3σ", of_scale, None, None, three))
         for term in params.terms:
-            name, maximum = _named(term, params.limits)
-            limit = Limit("ppm", maximum=maximum, source=TERM_SOURCE)
+            name, limit = _named(term, params.limits)
             found.append(PlannedCheck(f"gyro {name} {axis}", limit, sd[f"{term}_{axis}"]))
-    level = params.limits.residual_p_value_min
-    limit = Limit("1", minimum=level, source="ours: a test of significance")
-    return (*found, PlannedCheck("gyro residuals, p-value of chi-square", limit, level=level))
+    return (*found, *planned_tests(params.limits, "residual_p_value_min", RESIDUALS))
 
 
-def _named(term: Term, limits: Limits) -> tuple[str, float]:
-    """Name of a term in its check, and its limit [ppm]."""
-    if term == "asymmetry":
-        return "asymmetry", limits.asymmetry_ppm
-    return f"nonlinearity, {term}", limits.nonlinearity_ppm
+def _named(term: Term, limits: Limits) -> tuple[str, Limit]:
+    """Name of a term in its check, and its limit."""
+    name, field = ("asymmetry",) * 2 if term == "asymmetry" else (f"nonlinearity, {term}", "nonlinearity")
+    most = f"{field}_ppm"
+    return name, largest(limits, most, "ppm", TERM_SOURCE)
 
 
 def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
     limits, ppm = params.limits, units.PPM
-    of_scale = Limit("ppm", maximum=limits.scale_factor_3_sigma_ppm, source="ours")
+    of_scale = largest(limits, "scale_factor_3_sigma_ppm", "ppm")
     checks: list[Check] = []
     for number, axis in enumerate(AXES, start=1):
         k = found.coefficient(f"K{number}{number}")
         checks.append(check(f"gyro scale factor {axis}, 3σ", 3.0 * k.standard_uncertainty / ppm, of_scale))
         for term in params.terms:
-            name, maximum = _named(term, limits)
+            name, limit = _named(term, limits)
             c = found.coefficient(f"{term}_{axis}")
-            limit = Limit("ppm", maximum=maximum, source=TERM_SOURCE)
             checks.append(check(f"gyro {name} {axis}", abs(c.estimate) / ppm, limit, c.standard_uncertainty / ppm))
     if found.p_value is not None:
-        checks.append(significance("gyro residuals, p-value of chi-square", found.p_value, limits.residual_p_value_min))
+        level, source = limits.residual_p_value_min, limits.source_of("residual_p_value_min", SIGNIFICANCE)
+        checks.append(significance(RESIDUALS, found.p_value, level, source=source))
     return tuple(checks)
+
+
+def quantities(params: Params, _context: Context) -> tuple[str, ...]:
+    """Return the names of the checks and coefficients that a result will have."""
+    terms = (_named(term, params.limits)[0] + " {}" for term in params.terms)
+    checks = (f"gyro {name.format(axis)}" for name in ("scale factor {}, 3σ", *terms) for axis in AXES)
+    return (*checks, RESIDUALS, *(f"gyro.{name}" for name in coefficient_names(params.terms)))
 
 
 PROCEDURE = Procedure(
     *("scale_factor_whole_turns", "Gyro scale factor by whole turns", "1.2.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
+    quantities=quantities,
     planned_checks=planned_checks,
 )

@@ -11,6 +11,7 @@ from math import ceil
 from pydantic import Field
 
 from procedures import steps
+from procedures.analysis.averaging_time import averaging_time
 from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.launch.prediction import predicted_noise, unresolved_noise
 from procedures.bench import Bench
@@ -21,7 +22,8 @@ from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
 from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
-from procedures.noise_limits import THESIS_LIMITS, NoiseLimits, noise_checks
+from procedures.noise_limits import ABSENCE_LEVEL, READY_S, THESIS_LIMITS, NoiseLimits, noise_checks
+from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -42,20 +44,20 @@ class Limits(NoiseLimits):
         THESIS_LIMITS["accelerometer_bias_in_run_m_s2"], gt=0.0, le=100.0, description="bias instability"
     )
     readiness_s: float | None = Field(
-        600.0,
+        READY_S,
         gt=0.0,
         le=1e6,
         description="since the launch, by which a warm-up that was found has ended; null: no check",
     )
     absence_level: float | None = Field(
-        0.001,
+        ABSENCE_LEVEL,
         gt=0.0,
         le=0.2,
         description="rate random walk and ramp must be absent; chance that a sound unit fails; null: no check",
     )
 
 
-class Params(NoiseParameters):
+class Params(NoiseParameters, SupplyParameters):
     """Number and duration of the launches, and settings of their analysis."""
 
     noise_limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -98,6 +100,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             power_off_s=params.off_time_s,
             temperatures=params.temperatures,
             sample_rate_hz=params.sample_rate_hz,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i in range(params.launches)
     )
@@ -167,10 +170,22 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
             old = records[triad] or TriadRecord((noise[x], noise[y], noise[z]))
             found = {"noise": (noise[x], noise[y], noise[z]), "not_observed": (absent[x], absent[y], absent[z])}
             records[triad] = replace(old, noise_origin=origin, **found)
-    dwell = unit.averaging_time_s
-    if result.averaging_time_s is not None:
-        dwell = DWELL_STEP_S * ceil(result.averaging_time_s / DWELL_STEP_S)
+    dwell = unit.averaging_time_s if result.averaging_time_s is None else _whole_steps(result.averaging_time_s)
     return replace(unit, gyro=records["gyro"], accelerometer=records["accelerometer"], averaging_time_s=dwell)
+
+
+def expected_averaging_time(_params: Params, context: Context) -> float | None:
+    """Return the averaging time that the unit's record is expected to have afterwards, by the noise that it has now
+    [s]; None where that noise is not known, or has no such time.
+    """
+    records = [record for triad in TRIADS if (record := context.unit.triad(triad)) is not None]
+    times = [averaging_time(noise).tau_s for record in records for noise in record.observed_noise]
+    longest = max((t for t in times if t), default=None)
+    return None if longest is None else _whole_steps(longest)
+
+
+def _whole_steps(time_s: float) -> float:
+    return DWELL_STEP_S * ceil(time_s / DWELL_STEP_S)
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
@@ -210,6 +225,7 @@ PROCEDURE = Procedure(
     analyse,
     report,
     learns=learns,
+    expected_averaging_time=expected_averaging_time,
     quantities=quantities,
     planned_checks=planned_checks,
     inspection=lambda _: LAUNCH,

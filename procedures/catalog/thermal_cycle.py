@@ -27,12 +27,13 @@ from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.frames import upward_axis
-from procedures.core.limits import verdict
+from procedures.core.limits import ASKED, verdict
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.thermal_correction import Form
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
+from procedures.parameters import SupplyParameters
 from procedures.procedure import STATIONS, Context, JudgedParameters, Outcome, Prediction, Procedure
 from procedures.reports import thermal_figures, thermal_tables
 from procedures.thermal_parameters import DEFAULT_LEGS, Leg, Limits, Regime, Soak
@@ -41,7 +42,7 @@ LEAST_OFF_S = 3.0 * units.HOUR
 """Least time switched off between runs, three hours (thesis 4.2.1)."""
 
 
-class Params(JudgedParameters):
+class Params(JudgedParameters, SupplyParameters):
     """Profile, analysis and limits of the cycle."""
 
     legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)
@@ -133,6 +134,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             temperatures=True,
             sample_rate_hz=params.sample_rate_hz,
             profile=profile,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i, axis in enumerate(AXES)
     )
@@ -222,7 +224,9 @@ def _withheld(context: Context) -> tuple[str, ...]:
 
 
 def _limits(params: Params) -> CycleLimits:
-    return CycleLimits(**params.limits.model_dump(), level=params.level)
+    given = [(params.limits, name) for name in type(params.limits).model_fields]
+    sources = {name: ASKED for of, name in (*given, (params, "level")) if of.source_of(name) == ASKED}
+    return CycleLimits(**params.limits.model_dump(), level=params.level, sources=sources)
 
 
 def _up(recording: Recording) -> int:
@@ -283,6 +287,7 @@ PROCEDURE = Procedure(
     uses_calibration=("accelerometer",),
     corrections=corrections,
     uses_corrections=uses_corrections,
+    quantities=lambda params, _: tuple(one.check for one in planned_cycle_checks(_limits(params))),
     planned_checks=lambda params, _: planned_cycle_checks(_limits(params)),
     inspection=lambda _: replace(STATIONS, temperatures=True),
 )

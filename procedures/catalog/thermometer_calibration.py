@@ -6,7 +6,6 @@ then two minutes on, brought back to the moment of switching on (`analysis.therm
 """
 
 from collections.abc import AsyncIterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +17,7 @@ from procedures.analysis.thermal.thermometers import Calibrated, Soaked, SoakSet
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
@@ -35,7 +34,6 @@ from procedures.procedure import (
 )
 from procedures.reports.thermometers import thermometer_report
 
-OURS = "ours"
 WORTH_SAYING_C = 0.02
 """A rest of a step that the unit has not followed is worth a warning beyond this [°C]."""
 EXPECTED_READING_SD_C = 0.02
@@ -190,7 +188,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 def planned_checks(params: Params, _context: Context) -> tuple[PlannedCheck, ...]:
     """Return the tests of significance that a result will have, each with the chance that a sound unit fails it."""
-    level, source = params.limits.level, "ours: a test of significance"
+    level, source = params.limits.level, params.limits.source_of("level", SIGNIFICANCE)
     each = Limit("1", minimum=level / len(SENSORS), source=source)
     found = [PlannedCheck(f"{name} {LINE}", each, level=level / len(SENSORS)) for name in SENSORS]
     pairs = len(SENSORS) * len(both_ways(params.temperatures_c))
@@ -206,16 +204,17 @@ LINE, PATH = "is a straight line, p-value", "up against down, p-value"
 def _checks(found: Calibrated, limits: Limits) -> list[Check]:
     checks: list[Check] = []
     for s in found.sensors:
-        offset, slope = Limit("degC", maximum=limits.offset_c, source=OURS), Limit("1", maximum=limits.slope)
+        offset = Limit("degC", maximum=limits.offset_c, source=limits.source_of("offset_c"))
+        slope = Limit("1", maximum=limits.slope, source=limits.source_of("slope"))
         checks.append(check(f"{s.channel} offset", abs(s.offset_c), offset, s.offset_sd_c))
-        checks.append(check(f"{s.channel} slope", abs(s.slope), replace(slope, source=OURS), s.slope_sd))
+        checks.append(check(f"{s.channel} slope", abs(s.slope), slope, s.slope_sd))
     # Bonferroni: several sensors, and several pairs, one chance.
-    level = limits.level / len(found.sensors)
-    checks += [significance(f"{s.channel} {LINE}", s.p_value, level) for s in found.sensors]
+    level, source = limits.level / len(found.sensors), limits.source_of("level", SIGNIFICANCE)
+    checks += [significance(f"{s.channel} {LINE}", s.p_value, level, source=source) for s in found.sensors]
     if found.hysteresis:
         worst = min(found.hysteresis, key=lambda h: h.p_value)
         note = f"worst: {worst.channel} at {worst.target_c:g} °C"
-        checks.append(significance(PATH, worst.p_value, limits.level / len(found.hysteresis), note))
+        checks.append(significance(PATH, worst.p_value, limits.level / len(found.hysteresis), note, source))
     return checks
 
 

@@ -42,15 +42,17 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.dwells import DwellParameters, expected_stations, saved_tables
+from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.reports import diagnosis as diagnoses
 from procedures.site_parameters import TableParameters, declared_table
+from procedures.triad_checks import in_run_limit
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
@@ -76,7 +78,7 @@ class Limits(Parameters):
     )
 
 
-class Params(TableParameters, DwellParameters):
+class Params(TableParameters, DwellParameters, SupplyParameters):
     """Orientations of the verification and limits of the unit. None takes the unit's or the bench's value.
 
     The accuracy of table and azimuth concerns the diagnosis alone; the magnitudes do not depend on it.
@@ -125,6 +127,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.dwell_s,
             temperatures=params.thermal_correction == "current",
             until=params.until,
+            supply_voltage_v=params.supply_voltage_v,
         )
         for i, (inner, middle, outer) in enumerate(params.orientations)
     )
@@ -185,7 +188,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
     params = resolve(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     level = params.limits.prediction_p_value_min
-    limit = Limit("1", minimum=level, source="ours: a test of significance")
+    limit = Limit("1", minimum=level, source=_level_source(params.limits))
     name = "errors as predicted, p-value of chi-square"
     found = [_in_run(p, params.limits) for p in plans]
     return (*found, *(PlannedCheck(f"{triad} {name}", limit, level=level) for triad in TRIAD_NAMES))
@@ -264,12 +267,15 @@ def _warnings(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
 
 
 def _in_run(plan: TriadPlan, limits: Limits) -> PlannedCheck:
-    gyro = plan.triad == "gyro"
-    maximum = limits.gyro_bias_in_run_deg_h if gyro else limits.accelerometer_bias_in_run_m_s2
-    level = limits.prediction_p_value_min
-    if maximum is None and level == 0.0:
+    given, level = in_run_limit(plan.triad, limits), limits.prediction_p_value_min
+    if given.maximum is None and level == 0.0:
         raise BadParameter("limits.prediction_p_value_min", level, "above 0: the limit of the plan is made with it")
-    return requirements.in_run_check(plan, maximum, planned_covariance(plan), level or requirements.IN_RUN_LEVEL)
+    covariance, of_plan = planned_covariance(plan), level or requirements.IN_RUN_LEVEL
+    return requirements.in_run_check(plan, given.maximum, covariance, of_plan, given.source)
+
+
+def _level_source(limits: Limits) -> str:
+    return limits.source_of("prediction_p_value_min", SIGNIFICANCE)
 
 
 def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check]:
@@ -278,7 +284,7 @@ def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check
     checks = [check(planned.check, m.per_axis / size, planned.limit, m.per_axis_sd / size, "", len(m.after) - 1.0)]
     if t.p_value is not None:
         name = f"{m.triad} errors as predicted, p-value of chi-square"
-        checks.append(significance(name, t.p_value, limits.prediction_p_value_min))
+        checks.append(significance(name, t.p_value, limits.prediction_p_value_min, source=_level_source(limits)))
     return checks
 
 

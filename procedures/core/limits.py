@@ -14,8 +14,8 @@ from typing import Literal
 
 RuleName = Literal["simple", "guarded"]
 OutcomeName = Literal["pass", "conditional pass", "conditional fail", "fail", "inconclusive"]
-ASKED = "the request"
-"""Source of a limit that a request gave."""
+OURS, SIGNIFICANCE, ASKED = "ours", "ours: a test of significance", "the request"
+"""Sources of limits that no document gives: this program's own, its level of a test, one that a request gave."""
 BOUND_RULE = "an upper bound of what was not observed: it passes within the limit, and decides nothing outside"
 COVERAGE = 0.9545
 """Coverage probability without another wish: k = 2 of a normal distribution."""
@@ -149,7 +149,8 @@ class Check:
     """Check of one value against one limit: passed or not, with its uncertainty and the decision."""
 
     name: str
-    value: float
+    value: float | None
+    """Value in the limit's unit; None: an upper bound that is infinite, as nothing bounds what was not observed."""
     limit: Limit
     passed: bool
     standard_uncertainty: float | None = None
@@ -161,7 +162,7 @@ class Check:
     significance: bool = False
     """True for a test of significance: the value is a p-value and the limit its level."""
     bound: bool = False
-    """True: nothing was observed, and the value is what it stays below."""
+    """True: nothing was observed, and the value is what it stays below; a value of None: it is unbounded."""
 
     @property
     def inconclusive(self) -> bool:
@@ -201,31 +202,38 @@ def check(
 ) -> Check:
     """Return the check of a value against its limit by simple acceptance. A value that is not finite never passes.
 
-    `bound`: nothing was observed, and the value is what it stays below.
+    `bound`: nothing was observed, and the value is what it stays below; one of infinity becomes None, unbounded.
     """
     passed = (
         isfinite(value)
         and (limit.maximum is None or value <= limit.maximum)
         and (limit.minimum is None or value >= limit.minimum)
     )
-    return Check(name, value, limit, passed, standard_uncertainty, note, degrees_of_freedom, bound=bound)
+    held = None if bound and value == inf else value
+    return Check(name, held, limit, passed, standard_uncertainty, note, degrees_of_freedom, bound=bound)
 
 
 def upper_bound(name: str, bound: float, limit: Limit, reason: str = "not observed") -> Check:
-    """Return the check of what was not observed, by the value that it stays below."""
-    return check(name, bound, limit, note=f"{reason}: the value is what it stays below", bound=True)
+    """Return the check of what was not observed, by the value that it stays below; infinity: unbounded."""
+    told = "unbounded, nothing limits it from above" if bound == inf else "the value is what it stays below"
+    return check(name, bound, limit, note=f"{reason}: {told}", bound=True)
 
 
 def asked_limit(unit: str, maximum: float, default: float, source: str) -> Limit:
     """Return a largest value with its source: that of the default, unless the request gave another value."""
-    return Limit(unit, maximum=maximum, source=source if maximum == default else ASKED)
+    return Limit(unit, maximum=maximum, source=source_of(maximum, default, source))
+
+
+def source_of(value: object, default: object, source: str) -> str:
+    """Return the source of a limit: that of the default, unless the request gave another value."""
+    return source if value == default else ASKED
 
 
 def significance(name: str, p_value: float, level: float, note: str = "", source: str = "") -> Check:
     """Return the check of a test of significance at a level: it fails where the p-value is below it. Such a value has
     no uncertainty.
     """
-    limit = Limit("1", minimum=level, source=source or "ours: a test of significance")
+    limit = Limit("1", minimum=level, source=source or SIGNIFICANCE)
     return replace(check(name, p_value, limit, note=note), significance=True)
 
 
@@ -236,7 +244,7 @@ def decided(made: Check, rule: Rule) -> Check:
     if made.significance:
         outcome = "pass" if made.passed else "fail"
         return replace(made, decision=Decision(f"test of significance at {made.limit.minimum or 0.0:g}", outcome))
-    distance = inside(made.value, made.limit.minimum, made.limit.maximum)
+    distance = -inf if made.value is None else inside(made.value, made.limit.minimum, made.limit.maximum)
     found = decide(distance, made.passed, made.standard_uncertainty, made.degrees_of_freedom, rule)
     return replace(made, passed=found.outcome.endswith("pass"), decision=found)
 

@@ -144,7 +144,7 @@ class Station:
     current_ma: float | None = None
     """Current of the source into all three inputs of a lone converter; None: a whole unit is tested."""
     supply_voltage_v: float | None = None
-    """Voltage of the unit's supply, set before it is switched on; None: as it is set."""
+    """Voltage of the unit's supply, set before it is switched on; None: as it is, nominal unless it was set before."""
     profile: TemperatureProfile | None = None
     """Temperature profile of the chamber meanwhile; the recording ends with the last soak, at most after `record_s`."""
     until: StopRule | None = None

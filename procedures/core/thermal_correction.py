@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from procedures.core.arrays import Array
-from procedures.core.converter import ConverterTriad
+from procedures.core.converter import ConverterTriad, at_reference
 from procedures.core.errors import BadParameter
 from procedures.core.temperature.thermometers import ThermometerCorrection
 
@@ -175,3 +175,14 @@ class ThermalCorrection:
         own = case_c if case_c.ndim == 2 else np.repeat(case_c[:, None], 3, axis=1)
         columns = [a.apply(output_m_s2[:, i], own[:, i], converter_c, dynamic) for i, a in enumerate(self.axes)]
         return np.column_stack(columns)
+
+    def at_reference(self, output_m_s2: Array, case_c: Array, converter_c: Array) -> Array:
+        """Return what the channels would have shown at the reference temperatures, (n, 3) [m/s²]: ``Ṽ/K0 − B0``.
+
+        The converter's own models are taken out first where the fit had them taken out; the form ``switched`` is in its
+        static regime. Arguments as of `apply`.
+        """
+        stage = self.first_stage
+        staged = output_m_s2 if stage is None else at_reference(output_m_s2, converter_c, stage)
+        felt = self.apply(staged, case_c, converter_c, 0.0)
+        return felt / self.scales - np.array([axis.bias_m_s2 for axis in self.axes])

@@ -111,5 +111,5 @@ def _line(letter: str, name: str, of: Noise) -> str:
     found = of.coefficients[letter]
     if found.value is None or found.standard_uncertainty is None:
         limit = f", below {found.upper_limit / size:.2g} {unit}" if found.upper_limit is not None else ""
-        return f"{letter} not observed{limit}"
+        return f"{letter} not observed{', unbounded' if found.unbounded else limit}"
     return f"{letter} {found.value / size:.4g} ± {found.standard_uncertainty / size:.2g} {unit}"

@@ -57,6 +57,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 METHOD = Method(
     *("ferraris_calibration_of_recordings", "Calibration on six faces from recordings", "1.1.0"),
     *(Params, Result, analyse, ferraris.report, ferraris.calibrations),
+    planned_checks=lambda params, unit, _: ferraris.planned_residuals(params.limits, unit),
     inspection=lambda _params, _count: STATIONS,
 )
 """Both triads from rests and whole turns that were recorded before."""

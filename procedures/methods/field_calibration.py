@@ -28,12 +28,13 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, check, significance, verdict
-from procedures.core.recording import ACCELEROMETER, GYRO, Recording
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significance, verdict
+from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
+from procedures.parameters import planned_tests
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
@@ -229,18 +230,21 @@ def _fit(
     return examined_fit(what, means, noise, known, model, uncertainty)
 
 
+RESIDUALS = "residuals, p-value of chi-square"
+
+
 def _checks(triads: Sequence[FieldTriad], params: Params) -> list[Check]:
-    limit = Limit("1", params.scale_sd_limit, source="ours")
+    limit = Limit("1", params.scale_sd_limit, source=params.source_of("scale_sd_limit"))
     greatest = max(triads[0].scale_relative_sd)
     found = [check("accelerometer scale factor, greatest relative standard uncertainty", greatest, limit)]
     for t in triads:
         note = "; ".join(filter(None, (f"worst: {t.worst}", t.suspected)))
         name = t.calibration.triad
         if t.p_value is not None:
-            level = params.residual_p_value_min
-            found.append(significance(f"{name} residuals, p-value of chi-square", t.p_value, level, note))
+            level, source = params.residual_p_value_min, params.source_of("residual_p_value_min", SIGNIFICANCE)
+            found.append(significance(f"{name} {RESIDUALS}", t.p_value, level, note, source))
         elif t.misfit is not None:
-            limit = Limit("1", maximum=params.misfit_max, source="ours")
+            limit = Limit("1", maximum=params.misfit_max, source=params.source_of("misfit_max"))
             found.append(check(f"{name} residuals over what noise and positions allow", t.misfit, limit, note=note))
     return found
 
@@ -281,5 +285,8 @@ METHOD = Method(
     analyse,
     report,
     calibrations,
+    planned_checks=lambda params, _unit, _planned: planned_tests(
+        params, "residual_p_value_min", *(f"{triad} {RESIDUALS}" for triad in TRIADS)
+    ),
     inspection=inspection,
 )

@@ -26,10 +26,11 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
 from procedures.core.imu_model import TriadCalibration, correct
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import ASKED, SIGNIFICANCE, Check, Limit, check, significance, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
+from procedures.parameters import planned_tests
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
 
 NAMES = ("gyro", "accelerometer")
@@ -184,14 +185,25 @@ def _at(time_s: Array, track: Track, values: Array) -> tuple[float, ...]:
     return tuple(np.interp(time_s, track.time_s, values).tolist())
 
 
+DRIFT = "drift as predicted, p-value of its Mahalanobis distance"
+
+
 def _checks(params: Params, track: Track, p_value: float | None, distance: float) -> tuple[Check, ...]:
     made: list[Check] = []
     if p_value is not None:
         level = params.p_value_min
         note = f"{distance:.3g} standard deviations"
-        made.append(significance("drift as predicted, p-value of its Mahalanobis distance", p_value, level, note))
+        made.append(
+            significance(
+                DRIFT,
+                p_value,
+                level,
+                note,
+                params.source_of("p_value_min", SIGNIFICANCE),
+            )
+        )
     if params.drift_max_m is not None:
-        limit = Limit("m", maximum=params.drift_max_m)
+        limit = Limit("m", maximum=params.drift_max_m, source=ASKED)
         made.append(check("greatest distance from the start", float(track.radial_m.max()), limit))
     return tuple(made)
 
@@ -251,5 +263,6 @@ METHOD = Method(
     Result,
     analyse,
     report,
+    planned_checks=lambda params, _unit, _planned: planned_tests(params, "p_value_min", DRIFT),
     inspection=lambda _params, _count: Inspection(FitnessSettings(least_samples=1), GYRO + ACCELEROMETER),
 )

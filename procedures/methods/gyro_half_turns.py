@@ -154,7 +154,7 @@ def _channel(c: int, found: HalfTurns, params: Params) -> GyroChannel:
 
 def _checks(rate: float, sd: float, expected: float | None, found: HalfTurns, params: Params) -> tuple[Check, ...]:
     relative = sd / rate if rate > 0.0 else float("inf")
-    limit = Limit("1", params.relative_sd_max, source="ours")
+    limit = Limit("1", params.relative_sd_max, source=params.source_of("relative_sd_max"))
     checks = [check("horizontal rate, relative standard uncertainty", relative, limit)]
     if expected is not None:
         reach = found.coverage_factor(CONFIDENCE) * sd

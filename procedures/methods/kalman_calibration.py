@@ -19,10 +19,11 @@ from procedures.analysis.recursive_bias.kalman import RecursiveBias, white_covar
 from procedures.analysis.recursive_bias.window_noise import WindowMeans
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import ASKED, Check, Limit, check, significance, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
+from procedures.parameters import planned_tests
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
 
 
@@ -230,7 +231,7 @@ def _checks(b: ChannelBias, level: float) -> tuple[Check, ...]:
     if b.noise == "record":
         found.append(significance(f"{where}: innovations, p-value", b.innovations_p_value, level))
     if b.target_sd is not None:
-        limit = Limit(name, b.target_sd / size, source="target")
+        limit = Limit(name, b.target_sd / size, source=ASKED)
         found.append(check(f"{where}: standard uncertainty", b.standard_uncertainty / size, limit))
     return tuple(found)
 
@@ -258,6 +259,9 @@ def inspection(params: Params, count: int) -> Inspection:
     return Inspection(FitnessSettings(least_samples=1, counters_may_rest=True), params.channels or GYRO + ACCELEROMETER)
 
 
+TESTS = "innovations and scatter of all channels, smallest p-value"
+"""Name of the planned test; its level is shared among the channels, which are known with the recordings."""
+
 METHOD = Method(
     "kalman_calibration",
     "Kalman calibration of a constant bias",
@@ -266,5 +270,6 @@ METHOD = Method(
     Result,
     analyse,
     report,
+    planned_checks=lambda params, _unit, _planned: planned_tests(params, "level", TESTS),
     inspection=inspection,
 )

@@ -8,7 +8,7 @@ from procedures.analysis.repeatability.seat_repeatability import CrossCoupling, 
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Limit, check, verdict
+from procedures.core.limits import ASKED, Limit, check, verdict
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
 from procedures.procedure import DatedCalibration, Evidence, JudgedParameters, Method, Outcome
@@ -50,7 +50,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
         raise BadParameter(
             "calibrations", len(evidence.calibrations), "one triad under at least two mountings is needed"
         )
-    limit = Limit("arcsec", maximum=params.repeatability_arcsec, source="the request")
+    limit = Limit("arcsec", maximum=params.repeatability_arcsec, source=ASKED)
     size = units.ARCSEC
     checks = tuple(
         check(f"{c.triad} {c.name} seat", c.sd / size, limit, c.sd / size / sqrt(2.0 * (len(c.values) - 1)))

@@ -168,6 +168,9 @@ METHOD = Method(
     multi_position.report,
     multi_position.calibrations,
     uses_corrections=uses_corrections,
+    planned_checks=lambda params, unit, _: multi_position.planned_residuals(
+        params, [triad for triad in params.triads if unit.triad(triad) is not None]
+    ),
     inspection=lambda params, _: replace(
         STATIONS, channels=tuple(channel for triad in params.triads for channel in TRIADS[triad])
     ),

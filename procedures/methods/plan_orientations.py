@@ -136,7 +136,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     )
     recommended = _recommended(plans)
     best = plans[recommended]
-    limit = Limit("1", minimum=params.improvement_min, source="ours")
+    limit = Limit("1", minimum=params.improvement_min, source=params.source_of("improvement_min"))
     checks = (check("worst uncertainty, reference over recommended", best.improvement, limit),)
     return Result(
         checks=checks,

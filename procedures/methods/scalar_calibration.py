@@ -28,10 +28,11 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significance, verdict
 from procedures.core.recording import TRIADS, Recording, rates, require_finite
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
+from procedures.parameters import planned_tests
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, Parameters, RecordedParameters
 
 TURNED = replace(STATIONS.settings, at_rest=False, beside_others=False)
@@ -221,22 +222,32 @@ def _result(fit: ScalarFit, params: Params, poses: Poses) -> Result:
     )
 
 
+RESIDUALS = "residuals, p-value of chi-square"
+
+
 def _checks(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[Check, ...]:
     relative = _relative_sd(fit, params)
     checks = [
-        check("condition number", fit.condition, Limit("1", maximum=params.condition_max)),
+        check(
+            "condition number",
+            fit.condition,
+            Limit("1", maximum=params.condition_max, source=params.source_of("condition_max")),
+        ),
         check(
             "greatest relative standard uncertainty of a parameter",
             float(relative.max()),
-            Limit("1", maximum=params.uncertainty_max),
+            Limit("1", maximum=params.uncertainty_max, source=params.source_of("uncertainty_max")),
             note=f"{PARAMETERS[int(np.argmax(relative))]}; beyond the limit it is practically undetermined",
         ),
     ]
     if fit.p_value is not None:
         note = f"worst: {misfit.worst}"
-        checks.append(significance("residuals, p-value of chi-square", fit.p_value, params.residual_p_value_min, note))
+        level, source = params.residual_p_value_min, params.source_of("residual_p_value_min", SIGNIFICANCE)
+        checks.append(significance(RESIDUALS, fit.p_value, level, note, source))
     elif not fit.noise_known:
-        checks += misfit.checks("residuals over the scatter within the poses", params.misfit_max)
+        checks += misfit.checks(
+            "residuals over the scatter within the poses", params.misfit_max, params.source_of("misfit_max")
+        )
     return tuple(checks)
 
 
@@ -275,5 +286,6 @@ METHOD = Method(
     analyse,
     report,
     calibrations,
+    planned_checks=lambda params, _unit, _planned: planned_tests(params, "residual_p_value_min", RESIDUALS),
     inspection=inspection,
 )

@@ -38,6 +38,7 @@ from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrect
 from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import UnitCorrection
+from procedures.parameters import planned_tests
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 from procedures.reports.temperature_dependence import dependence_report
 from procedures.thermal_parameters import Regime
@@ -106,6 +107,9 @@ class Result(Outcome):
     """Temperature of each recording in cells, by the first channel's sensor."""
 
 
+INDEPENDENCE = "independence of temperature, p-value"
+
+
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     """Return the dependence of every channel, fitted over all recordings. Raises `BadParameter`, `MissingChannel`,
     `UnfitRecording`.
@@ -121,9 +125,9 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     applied = known is not None and any(known.has(sensor) for sensor in sensors.values())
     series = [_series(recording, sensors, params, known) for recording in recordings]
     found = [_channel(recordings[0].info, name, sensors[name], [s[name] for s in series], params) for name in names]
-    level, source = params.level / len(names), "ours: no dependence on temperature"
-    name = "independence of temperature, p-value"
-    checks = tuple(significance(f"{c.channel} {name}", c.p_value, level, source=source) for c, _ in found)
+    source = params.source_of("level", "ours: no dependence on temperature")
+    level = params.level / len(names)
+    checks = tuple(significance(f"{c.channel} {INDEPENDENCE}", c.p_value, level, source=source) for c, _ in found)
     temperatures = [s.departure_c + params.reference_c for _, series in found for s in series]
     return Result(
         checks=checks,
@@ -282,5 +286,6 @@ METHOD = Method(
     *(Params, Result, analyse, report),
     corrections=corrections,
     uses_corrections=lambda result: ("thermometers",) if result.thermometers else (),
+    planned_checks=lambda params, _unit, _planned: planned_tests(params, "level", f"all channels: {INDEPENDENCE}"),
     inspection=lambda params, _: Inspection(replace(STATIONS.settings, least_samples=FEWEST), params.channels),
 )

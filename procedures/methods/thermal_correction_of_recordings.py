@@ -124,7 +124,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     stage = None if unit is None else unit.converter
     correction = replace(found, fitted_range=range_of(runs), first_stage=stage, thermometers=known)
     axes = tuple(_axis(fit, runs) for fit in fits)
-    checks = tuple(_check(one, params.three_sigma_m_s2) for one in axes)
+    checks = tuple(_check(one, params) for one in axes)
     return Result(
         checks=checks,
         verdict=verdict(checks),
@@ -253,14 +253,13 @@ def _axis(fit: AxisFit, runs: Sequence[ThermalRun]) -> AxisResult:
     )
 
 
-def _check(one: AxisResult, limit: float) -> Check:
+def _check(one: AxisResult, params: Params) -> Check:
     at_rest = one.static_sd_m_s2 is not None
     value = one.static_sd_m_s2 if one.static_sd_m_s2 is not None else one.dynamic_sd_m_s2 or 0.0
     note = "in sample" if at_rest else "in sample, on ramps: the temperature never stood still"
-    source = "thesis 4.3"
-    return check(
-        f"{one.axis} after correction, 3σ", 3.0 * value, Limit("m/s^2", maximum=limit, source=source), note=note
-    )
+    source = params.source_of("three_sigma_m_s2", "thesis 4.3")
+    limit = Limit("m/s^2", maximum=params.three_sigma_m_s2, source=source)
+    return check(f"{one.axis} after correction, 3σ", 3.0 * value, limit, note=note)
 
 
 def _warnings(

@@ -245,7 +245,9 @@ def _line(channel: ChannelNoise, coefficient: Coefficient, size: float) -> tuple
 
 def _ways(c: Coefficient, size: float) -> tuple[Cell, ...]:
     fit = c.likelihood
-    interval = None if fit.lower is None or fit.upper is None else f"{fit.lower / size:.4g} … {fit.upper / size:.4g}"
+    interval = None if fit.lower is None else f"≥ {fit.lower / size:.4g}, unbounded"
+    if fit.lower is not None and fit.upper is not None:
+        interval = f"{fit.lower / size:.4g} … {fit.upper / size:.4g}"
     return (
         _of(c.graphical.value, size),
         _shown(c.least_squares, size),
@@ -260,9 +262,10 @@ def _ways(c: Coefficient, size: float) -> tuple[Cell, ...]:
 def _shown(reading: Reading, size: float) -> Cell:
     if reading.value is not None:
         return reading.value / size
-    if reading.upper_limit is None:
+    if reading.upper_limit is None and not reading.unbounded:
         return None
-    return f"{'–' if reading.described else 'not described'} (< {reading.upper_limit / size:.2g})"
+    limit = "unbounded" if reading.upper_limit is None else f"< {reading.upper_limit / size:.2g}"
+    return f"{'–' if reading.described else 'not described'} ({limit})"
 
 
 def _of(value: float | None, size: float) -> float | None:

@@ -171,7 +171,8 @@ def _noise(g: GyroNoise, process: int, size: float) -> tuple[Cell, Cell]:
     value = (g.quantization, g.random_walk, g.bias_instability)[process]
     sd = g.uncertainties[process]
     if value is None:
-        return f"– (< {g.upper_limits[process] / size:.2g})", None
+        limit = g.upper_limits[process]
+        return f"– ({'unbounded' if limit is None else f'< {limit / size:.2g}'})", None
     return value / size, None if sd is None else sd / size
 
 

@@ -86,8 +86,9 @@ class SimSupply:
             self._power_down()
 
     async def make_safe(self) -> None:
-        """Switch the unit off."""
+        """Switch the unit off, and forget the voltage that was set: what comes next begins at the nominal one."""
         await self.switch_off()
+        self._set = (self.limits.nominal_v, self.limits.nominal_a)
 
     def checkpoint(self) -> dict[str, Any]:
         """State of the supply, from which it can resume."""

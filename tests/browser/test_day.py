@@ -70,6 +70,17 @@ def test_the_form_follows_the_schema_and_the_preview_follows_the_form(window: Wa
     expect(page.get_by_label("Dwell, s", exact=True)).to_have_value("5")
 
 
+SHOW_INTERLOCKS = """async () => {
+  const { interlocks } = await import("/static/interlocks.js");
+  const place = document.body.appendChild(Object.assign(document.createElement("ul"), { id: "apart" }));
+  const word = (name, bits) => ({ device: "turntable", name, raw: "", bits, since: "2031-05-06T07:08:09Z" });
+  const status = [word("interlock 1", ["Open"]), word("mode", [])];
+  interlocks(place, { chamber: { door_open: true, tripped: true }, status });
+  interlocks(place, { chamber: { door_open: true, tripped: false }, status });
+}"""
+"""The list of interlocks of readings that a bench of real devices could give, shown twice."""
+
+
 def test_a_running_job_is_watched_live(window: Watched, service: BenchProcess) -> None:
     job = service.submit(parameters={"dwell_s": 40_000.0})
     page = window.open(f"/jobs/{job}")
@@ -77,6 +88,12 @@ def test_a_running_job_is_watched_live(window: Watched, service: BenchProcess) -
     expect(page.locator("#table")).to_have_attribute("data-drawn", re.compile(r"-?\d"))
     expect(page.locator("#charts canvas").first).to_be_visible(timeout=20_000)
     expect(page.locator("#samples")).to_contain_text("deg/h")
+    page.evaluate(SHOW_INTERLOCKS)  # the simulated bench reports no status words
+    listed = page.locator("#apart li")
+    expect(listed).to_have_count(2)
+    expect(listed.nth(0)).to_contain_text("the chamber's door is open, since ")
+    expect(listed.nth(1)).to_contain_text("turntable interlock 1: Open, since ")
+    expect(listed.nth(1).locator("time")).to_have_attribute("datetime", "2031-05-06T07:08:09Z")
     expect(page.locator("#log li").first).to_be_visible()
     service.client.post(f"/api/v1/jobs/{job}/cancel")
     expect(page.locator("#state")).to_have_text("cancelled", timeout=20_000)

@@ -88,6 +88,12 @@ def test_switching_on_what_is_on_is_no_new_launch(rig: SupplyRig) -> None:
         await rig.port.make_safe()
         await rig.port.make_safe()
         assert not (await rig.port.read()).on
+        await rig.port.switch_on()
+        again = await rig.port.read()
+        nominal = (rig.port.limits.nominal_v, rig.port.limits.nominal_a)
+        assert (again.set_voltage_v, again.set_current_a) == pytest.approx(nominal), (
+            "the 27 V were a job's that is over"
+        )
 
     asyncio.run(scene())
 

@@ -9,8 +9,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.stats import t
+from scipy.stats import binom, t
 
+from bench_service.model.quantities import quantities
+from procedures.analysis.thermal.converter_bench import ConverterSoaks, fit_channels
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, DeviceFault, SoakNotReached
 from procedures.catalog.converter_bench import PROCEDURE, Params, Result
@@ -68,8 +70,51 @@ def test_the_order_is_chosen_where_enough_soaks_are_left(result: Result):
     chosen = PROCEDURE.analyse(recordings, params, CONTEXT)
     for channel in chosen.channels:
         assert len(channel.scale_bic) == len(channel.zero_bic) == 3
-        for part, bic in ((channel.model.scale, channel.scale_bic), (channel.model.zero, channel.zero_bic)):
-            assert len(part.coefficients) == 1 + int(np.argmin(bic)) > 1, "the truth is a square"
+        for part, tests in (
+            (channel.model.scale, channel.scale_p_values),
+            (channel.model.zero, channel.zero_p_values),
+        ):
+            order = len(part.coefficients)
+            assert order > 1, "the truth is a square"
+            assert tests[order - 2] <= 0.01
+            assert all(p > 0.01 for p in tests[order - 1 :])
+
+
+def test_an_order_too_many_is_as_rare_as_the_level_of_its_test_says():
+    draws, level = 60, 0.01
+    random = np.random.default_rng(11)
+    sensor = np.linspace(-40.0, 60.0, 11)
+    departure = sensor - 20.0
+    zero, scale = 12.0 + 0.02 * departure + 1e-4 * departure**2, 2184.0 * (1.0 + 1.5e-5 * departure)
+    both = np.stack([zero + 10.0 * scale, zero - 10.0 * scale], axis=1)
+    orders = []
+    for _ in range(draws):
+        codes = both[:, :, None] + random.normal(0.0, 0.006, (11, 2, 3))
+        found = fit_channels(ConverterSoaks(sensor, np.column_stack([sensor, sensor]), codes), 10.0, 20.0, None)
+        orders += [len(c.zero.value.coefficients) for c in found]
+        orders += [len(c.scale.value.coefficients) + 1 for c in found]
+    # The zero is of order 2 and may be taken for 3; the scale is of order 1 and may be taken for 2 or 3.
+    assert min(orders) == 2
+    assert np.sum(np.array(orders) > 2) <= binom.isf(1e-6, 6 * draws, 1.5 * level)
+
+
+def test_a_cube_that_the_soaks_show_is_kept():
+    random = np.random.default_rng(12)
+    sensor = np.linspace(-40.0, 60.0, 11)
+    zero = 12.0 + 0.02 * (sensor - 20.0) + 3e-6 * (sensor - 20.0) ** 3
+    codes = np.stack([zero + 21840.0, zero - 21840.0], axis=1)[:, :, None] + random.normal(0.0, 0.006, (11, 2, 3))
+    found = fit_channels(ConverterSoaks(sensor, np.column_stack([sensor, sensor]), codes), 10.0, 20.0, None)
+    assert [len(channel.zero.value.coefficients) for channel in found] == [3, 3, 3]
+
+
+def test_the_limits_are_known_beforehand(result: Result):
+    planned = [(one.check, one.limit) for one in PROCEDURE.planned_checks(Params.model_validate(SHORT), CONTEXT)]
+    assert planned == [(c.name, c.limit) for c in result.checks]
+    promised = PROCEDURE.quantities
+    assert promised is not None
+    assert set(promised(Params.model_validate(SHORT), CONTEXT)) == set(quantities(result.model_dump(mode="json"))), (
+        "every name, and no other"
+    )
 
 
 def test_the_models_are_the_truth_within_their_uncertainties(result: Result):

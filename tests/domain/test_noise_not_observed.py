@@ -6,8 +6,11 @@ import pytest
 
 from procedures.analysis.launch.results import Reading
 from procedures.analysis.launch.summary import effective
+from procedures.analysis.thermal.cycle.checks import CycleLimits, _noise
+from procedures.analysis.thermal.cycle.results import GyroNoise
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.unit import TriadRecord
+from procedures.core.units import DEG_PER_SQRT_HOUR
 
 
 def absent(limit: float) -> Reading:
@@ -37,3 +40,16 @@ def test_a_record_tells_what_was_found_from_what_is_only_bounded():
     assert (x.random_walk, x.bias_instability, x.rate_random_walk, x.rate_ramp) == (2.0, 0.0, 4.0, 0.0)
     assert y == noise
     assert z.random_walk == 0.0
+
+
+def test_gyros_that_no_run_of_a_cycle_bounds_are_inconclusive():
+    """The bound of one of two runs counts for the walk; the flicker, which neither bounds, has no value."""
+    limits = CycleLimits(1.0, 1.0, 1.0, 0.003, 0.015, 0.01)
+    nothing = (None, None, None)
+    open_run, bounded = (
+        GyroNoise(n, "x", *nothing, nothing, (1.0, w, None), None) for n, w in (("a", None), ("b", 1e-9))
+    )
+    walk, flicker = (_noise("gyro_x", [open_run, bounded], process, limits) for process in (1, 2))
+    assert walk.passed
+    assert walk.value == pytest.approx(1e-9 / DEG_PER_SQRT_HOUR)
+    assert (flicker.value, flicker.inconclusive) == (None, True)

@@ -53,6 +53,8 @@ def test_a_good_unit_passes_in_two_minutes(taken: list[MemoryRecording], context
     quantities = POLARITY.quantities
     assert quantities is not None
     assert tuple(c.name for c in result.checks) == quantities(PARAMS, context)
+    planned = {one.check: one.limit for one in POLARITY.planned_checks(PARAMS, context)}
+    assert planned == {c.name: c.limit for c in result.checks}
     assert POLARITY.predict(PARAMS, context).duration_s < 120.0
     # The default unit's K of the thesis's tables 5.1, 5.2, to what pulses, level and rest leave of one turn.
     assert np.array(result.triads[0].matrix).diagonal() == pytest.approx([1.0048, 1.0017, 1.0009], abs=0.002)

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench_service.model.quantities import quantities
+from procedures.analysis.thermal.cycle.checks import cycle_checks
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
 from procedures.catalog import thermal_cycle
 from procedures.catalog.thermal_cycle import Params, Result
 from procedures.core.errors import BadParameter, DomainError, UnfitRecording
-from procedures.core.limits import Verdict
+from procedures.core.limits import ASKED, Verdict
 from procedures.core.recording import MemoryRecording
 from procedures.core.report import Figure, Table
 from procedures.procedure import Context
@@ -60,6 +62,26 @@ def test_a_sound_unit_passes_and_its_result_survives_storage(result: Result):
     assert len(result.model_dump_json()) < 2_000_000
     assert result.cycle.stage_one
     assert result.cycle.force_known
+
+
+def test_the_limits_are_known_beforehand(result: Result, known: Context):
+    planned = {one.check: one.limit for one in thermal_cycle.PROCEDURE.planned_checks(PARAMS, known)}
+    assert planned == {c.name: c.limit for c in result.checks}
+    promised = thermal_cycle.PROCEDURE.quantities
+    assert promised is not None
+    assert set(promised(PARAMS, known)) == set(quantities(result.model_dump(mode="json"))), "every name, and no other"
+
+
+def test_a_limit_that_was_given_has_the_request_for_its_source(result: Result):
+    """The same cycle is held to other limits; the thesis stands beside its own numbers alone."""
+    limits = thermal_cycle.Limits(three_sigma_m_s2=0.001, gyro_bias_in_run_deg_h=0.02)
+    given = thermal_cycle._limits(PARAMS.model_copy(update={"limits": limits, "level": 0.02}))
+    sources = {c.name: c.limit.source for c in cycle_checks(result.cycle, given)}
+    default = {c.name: c.limit.source for c in result.checks}
+    asked = ("3σ after correction", "bias instability in the cycle", "independence of temperature, p-value")
+    for name, source in sources.items():
+        assert source == (ASKED if name.endswith(asked) else default[name]), name
+        assert default[name].startswith("thesis")
 
 
 def test_all_coefficients_are_the_truth_within_their_uncertainties(result: Result):

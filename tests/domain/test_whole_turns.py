@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from bench_service.model.quantities import quantities
 from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.turns import fit as turns_fit
 from procedures.analysis.turns import summary
@@ -214,6 +215,9 @@ def test_from_recordings_to_a_result_and_back(turnable: Context) -> None:
     assert PROCEDURE.result.model_validate_json(result.model_dump_json()) == result
     found = result.gyro.coefficient("asymmetry_x")
     assert found.estimate == pytest.approx(30 * PPM, abs=2e-8)
+    promised, given = PROCEDURE.quantities, quantities(result.model_dump(mode="json"))
+    assert promised is not None
+    assert set(promised(params, turnable)) == set(given), "every name, and no other"
     failed = {c.name for c in result.checks if not c.passed}
     assert result.verdict is Verdict.FAIL
     assert {"gyro asymmetry x", "gyro nonlinearity, quadratic z", "gyro nonlinearity, cubic z"} <= failed

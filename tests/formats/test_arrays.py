@@ -46,6 +46,22 @@ def _count(column: str) -> dict[str, Any]:
     return {"name": name, "column": column, "quantity": "angular_rate", "unit": "count"}
 
 
+@pytest.mark.parametrize("room", ["memory", "temporary file", "none", "no space"])
+def test_a_packed_matrix_is_read_wherever_it_is_unpacked(room: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In memory where it is small, else in a temporary file, else, or where the disk is full, piece by piece."""
+    source = "bench_service.formats.logs.arrays_by_name.mat5_source"
+    if room != "memory":
+        monkeypatch.setattr(f"{source}.WHOLE_BYTES", 1000)
+    if room == "none":
+        monkeypatch.setattr(f"{source}.SPOOLED_BYTES", 1000)
+    if room == "no space":
+        full = lambda: Path("/dev/full").open("wb", buffering=0)  # noqa: E731, SIM115
+        monkeypatch.setattr(f"{source}.tempfile.TemporaryFile", full)
+    monkeypatch.setattr("bench_service.formats.logs.arrays_by_name.mat5.BLOCK_ROWS", 77)
+    content = {"imu": {"acc": FORCES, "gyro": RATES, "t": TIME_S}}
+    require_motion(mat_file(content, do_compression=True), 0.0)
+
+
 def test_a_mat_file_longer_than_a_block_is_read_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bench_service.formats.logs.arrays_by_name.mat5.BLOCK_ROWS", 7)
     monkeypatch.setattr("bench_service.formats.logs.arrays_by_name.mat5_source._PIECE", 100)

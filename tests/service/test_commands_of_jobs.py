@@ -5,7 +5,9 @@ import os
 from collections.abc import Callable, Generator
 from pathlib import Path
 
+import h5py
 import httpx
+import numpy as np
 import pytest
 
 from bench_service.cli.asking import leaving
@@ -298,10 +300,25 @@ def test_samples_go_out_in_si_and_a_job_as_a_zip(bench: Bench, address: str, tmp
     job = httpx.post(f"{address}/api/v1/jobs", json=terms).json()["id"]
     ended(address, job)
     recording = httpx.get(f"{address}/api/v1/recordings", params={"job": job}).json()["items"][0]["id"]
-    for name, more in (("s.h5", ()), ("s.mat", ()), ("s.csv", ("--values", "physical", "--decimate", "10"))):
-        assert bench("export", recording, "-o", tmp_path / name, *more).code == 0
+    physical = ("--values", "physical", "--decimate", "10")
+    for name, more, kind in (
+        ("s.h5", (), "raw"), ("s.mat", (), "raw"), ("s.feather", (), "raw"), ("s.npy", (), "raw"),
+        ("s.mcap", (), "physical"), ("m.mat", ("--decimate", "10"), "physical"), ("s.csv", physical, "physical"),
+    ):  # fmt: skip
+        done = bench("export", recording, "-o", tmp_path / name, *more)
+        assert (done.code, done.out.split(", ")[-1].strip()) == (0, f"{kind} values"), name
+        assert ("the samples are simulated" in done.err) is (name == "s.csv"), name
     assert (tmp_path / "s.csv").read_text().startswith("time_s,gyro_x_rad_per_s,")
-    assert (tmp_path / "s.h5").read_bytes().startswith(b"\x89HDF")
+    with h5py.File(tmp_path / "s.h5") as store:
+        assert store["gyro_x"].dtype == np.int32
+    proposal = bench("import", tmp_path / "s.h5", "--describe")
+    assert '"simulated": true' in proposal.out
+    assert bench("import", tmp_path / "s.h5", "--yes").code == 0
+    again = httpx.get(f"{address}/api/v1/recordings", params={"limit": 1}).json()["items"][0]
+    first = httpx.get(f"{address}/api/v1/recordings/{recording}").json()
+    assert (again["simulated"], again["content_hash"]) == (True, first["content_hash"])
+    one_line(bench("export", recording, "-o", tmp_path / "s.xls"), "csv, parquet, arrow, npy, feather, h5, mat, mcap")
+    one_line(bench("export", job, "-o", tmp_path / "job.zip", "--start-s", "1"), "whole recordings")
     assert bench("export", job, "-o", tmp_path / "job.zip", "--decimate", "100").code == 0
     assert (tmp_path / "job.zip").read_bytes().startswith(b"PK")
     result = httpx.get(f"{address}/api/v1/jobs/{job}").json()["result"]

@@ -41,8 +41,35 @@ def test_it_is_the_theses_campaign(sqlite_client: Client) -> None:
     answer = sqlite_client.http.post("/api/v1/campaigns/thesis_acceptance/preview", json={"unit": "SIM-0001"}).json()
     hours = {step["name"]: step["duration_s"] / 3600.0 for step in answer["steps"]}
     assert hours["static"] == pytest.approx(4 * 7.0, abs=0.01)
-    assert hours["calibration_1"] == pytest.approx(0.25, abs=0.01)
+    assert hours["calibration_1"] == pytest.approx(12 * 115.0 / 3600.0, abs=0.01), "dwells of 110 s, see below"
     assert any("10 ppm cannot be resolved" in warning for warning in answer["warnings"])
+
+
+def test_the_preview_knows_the_averaging_time_that_the_static_run_is_to_find(sqlite_client: Client) -> None:
+    """The longest crossing of the record's noise, gyro z's: ``fB²τ² + N²τ = 3Q²``, f = 2 ln 2/π, in steps of 5 s; the
+    record has 70 s. A calibration alone, or one with a dwell of its own, is planned as it would be without the run.
+    """
+    unit = SimulatedDriver("sim").mounted()[0]
+    assert unit.gyro is not None
+    z = unit.gyro.noise[2]
+    f, n2 = 2.0 * math.log(2.0) / math.pi * z.bias_instability**2, z.random_walk**2
+    tau = (math.sqrt(n2**2 + 12.0 * f * z.quantization**2) - n2) / (2.0 * f)
+    dwell = 5.0 * math.ceil(tau / 5.0)
+    assert (dwell, unit.averaging_time_s) == (110.0, 70.0)
+    static, calibration = {"procedure": "static_run"}, {"procedure": "calibration_12_orientations"}
+    add(sqlite_client, named("dwells", static, calibration, {**calibration, "parameters": {"dwell_s": 70.0}}))
+    add(sqlite_client, named("no_static", calibration))
+    foreseen = {
+        name: sqlite_client.http.post(f"/api/v1/campaigns/{name}/preview", json={"unit": "SIM-0001"}).json()["steps"]
+        for name in ("dwells", "no_static")
+    }
+    (_, after, given), (alone,) = foreseen["dwells"], foreseen["no_static"]
+    assert after["duration_s"] - alone["duration_s"] == pytest.approx(12 * (dwell - 70.0))
+    assert given["duration_s"] == alone["duration_s"]
+    sentence = "predicted with the averaging time of 110 s that step a is expected to find"
+    assert [any(sentence in w for w in step["warnings"]) for step in (after, given, alone)] == [True, False, False]
+    noise = [[c["standard_uncertainty"] for c in s["limits"] if "bias in run" in c["check"]] for s in (after, alone)]
+    assert noise[0][0] < noise[1][0], "longer dwells scatter less"
 
 
 def test_every_step_says_what_became_of_it(run: dict[str, Any]) -> None:
@@ -66,12 +93,17 @@ def test_a_result_has_what_its_procedure_promised(sqlite_client: Client, run: di
     unit_and_bench = (SimulatedDriver("sim").mounted()[0], SimulatedDriver("sim").description)
     for step in run["steps"]:
         procedure = catalog.discover().get(step["does"])
-        if procedure is None or procedure.quantities is None or step["job"] is None:
+        if procedure is None or step["job"] is None:
             continue
         job = service.get(f"/api/v1/jobs/{step['job']}").json()
-        context = Context(*unit_and_bench)
-        promised = procedure.quantities(procedure.params.model_validate(job["parameters"]), context)
+        context, params = Context(*unit_and_bench), procedure.params.model_validate(job["parameters"])
         found = {check["name"] for check in step["checks"]}
+        needs = procedure.uses_calibration or job["parameters"].get("thermal_correction") == "current"
+        if not needs:  # the unit of this context has neither
+            assert {one.check for one in procedure.planned_checks(params, context)} <= found, step["name"]
+        if procedure.quantities is None:
+            continue
+        promised = procedure.quantities(params, context)
         assert found == {name for name in promised if name in found}
         missing = [name for name in promised if name not in found and ".K" not in name and ".b_" not in name]
         assert missing == [], step["name"]

@@ -1,8 +1,10 @@
 """Thesis table 4.4 through REST: entered, made current by a person, and applied to a calibration."""
 
+import io
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bench_service.drivers.simulated import SimulatedDriver
@@ -86,3 +88,29 @@ def test_it_counts_when_a_person_says_so_and_a_calibration_applies_it(
             b = beta_[0] * dt + beta_[1] * dt**2 + beta_[2] * db + beta_[3] * db**2
             raw = SCALE[i] * (at_20[i] + BIAS[i]) / (SCALE[i] + a) - BIAS[i] - b
             assert share["change_m_s2"][k][i] == pytest.approx(at_20[i] - raw, abs=1e-7)
+    samples_go_out_corrected_by_it_until_it_is_rejected(sqlite_client, entered, job["id"])
+
+
+def samples_go_out_corrected_by_it_until_it_is_rejected(client: Client, entered: dict[str, Any], job: str) -> None:
+    """The formula of thesis 4.1 once more, sample by sample; `job`: one that recorded the temperatures."""
+    http = client.http
+    recording = client.recordings(job)[0]["id"]
+    query = {"corrected_by": entered["id"], "stop_s": 1.0}
+    answer = http.get(f"/api/v1/recordings/{recording}/samples", params=query)
+    assert answer.status_code == 200, answer.text
+    assert "-physical-corrected-part-simulated.csv" in answer.headers["Content-Disposition"]
+    found = pd.read_csv(io.BytesIO(answer.content))
+    plain = pd.read_csv(io.BytesIO(http.get(f"/api/v1/recordings/{recording}/samples", params={"stop_s": 1.0}).content))
+    for name, axis in zip("xyz", entered["thermal"]["axes"], strict=True):
+        dt = plain["temperature_case_degC"] - axis["case_reference_c"]
+        db = plain["temperature_converter_degC"] - axis["converter_reference_c"]
+        (a1, a2, a3, a4), (b1, b2, b3, b4) = axis["alpha"], axis["beta"]
+        scale = axis["scale"] + a1 * dt**2 + a2 * dt + a3 * db**2 + a4 * db
+        force = scale * (
+            plain[f"accelerometer_{name}_m_per_s2"] + axis["bias_m_s2"] + b1 * dt + b2 * dt**2 + b3 * db + b4 * db**2
+        )
+        wanted = force / axis["scale"] - axis["bias_m_s2"]
+        np.testing.assert_allclose(found[f"accelerometer_{name}_m_per_s2"], wanted, rtol=1e-12, atol=1e-12)
+    http.post(f"{UNIT}/corrections/{entered['id']}/reject", json={"by": "Ann", "remark": "of another unit"})
+    refused = http.get(f"/api/v1/recordings/{recording}/samples", params=query)
+    assert (refused.status_code, "not rejected" in refused.text) == (422, True)

@@ -7,9 +7,11 @@ from typing import Any
 import pytest
 
 from bench_service.cli.asking.client import connect
+from bench_service.model.quantities import quantities
 from bench_service.settings import Settings
 from simulators.truth import default_bench, save_bench
 from tests.kit.registered import register_bench
+from tests.service.campaigns import add, named
 from tests.service.client import Client
 from tests.service.page import drawn
 
@@ -57,7 +59,20 @@ def test_every_alignment_is_a_launch_and_errs_as_predicted(
     assert found[1]["attitude_deg"][0] == pytest.approx(75.0, abs=0.5)  # the outer axis turns against the compass
     assert found[1]["attitude_deg"][1] == pytest.approx(5.0, abs=0.01)
     assert found[1]["attitude_deg"][2] == pytest.approx(-8.0, abs=0.01)
-    assert len(result["document"]["checks"]) == 4
+    names = [c["name"] for c in result["document"]["checks"]]
+    assert len(names) == 4
+    assert set(quantities(result["document"])) == set(names)
+    wrong = {"quantity": "heading", "unit": "deg", "maximum": 1.0, "source": "ours"}
+    bad = named("bad", {"procedure": "initial_alignment", "parameters": PLAN, "limits": [wrong]})
+    assert "heading, expected standard uncertainty" in sqlite_client.http.post("/api/v1/campaigns", json=bad).text
+    step = {"procedure": "initial_alignment", "parameters": PLAN}
+    add(sqlite_client, named("aligned", step, decision={"false_alarm": 0.003}))
+    foreseen = sqlite_client.http.post("/api/v1/campaigns/aligned/preview", json={"unit": "SIM-0001"})
+    assert [limit["check"] for limit in foreseen.json()["steps"][0]["limits"]] == names
+    strict = named("strict", step, decision={"false_alarm": 0.002})
+    refused = sqlite_client.http.post("/api/v1/campaigns", json=strict)
+    assert refused.status_code == 422
+    assert "at least 0.003" in refused.text, "three tests of significance count, each at 0.001"
     assert result["verdict"] == "pass", result["document"]["checks"]
 
 

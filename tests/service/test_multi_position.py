@@ -9,6 +9,7 @@ import pytest
 from procedures.core.frames import specific_force_b
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
+from tests.service.campaigns import add, named
 from tests.service.client import Client
 
 
@@ -16,7 +17,7 @@ from tests.service.client import Client
 def job(sqlite_client: Client) -> dict:
     body = {
         "procedure": "multi_position_calibration",
-        "parameters": {"dwell_s": 10.0, "weighting": "noise"},
+        "parameters": {"dwell_s": 10.0, "weighting": "noise", "residual_p_value_min": 0.0005},
         "seed": 11,
     }
     done = sqlite_client.wait(sqlite_client.submit(**body)["id"])
@@ -37,6 +38,19 @@ def test_the_thesis_program_gives_fourteen_recordings_and_both_triads(sqlite_cli
         assert triad["condition"] < 1.5
         assert all(math.isfinite(c["standard_uncertainty"]) for c in triad["coefficients"])
     assert job["verdict"] == "pass", found["checks"]
+
+
+def test_each_limit_names_its_source(sqlite_client: Client, job: dict) -> None:
+    sources = {c["name"]: c["limit"]["source"] for c in document(sqlite_client, job)["checks"]}
+    assert sources["gyro residuals, p-value of chi-square"] == "the request"
+    assert sources["gyro condition number"] == "ours"
+    assert "" not in sources.values()
+    step = {"procedure": "multi_position_calibration", "parameters": {"dwell_s": 10.0, "residual_p_value_min": 0.0005}}
+    add(sqlite_client, named("positions", step))
+    foreseen = sqlite_client.http.post("/api/v1/campaigns/positions/preview", json={"unit": "SIM-0001"}).json()
+    planned = {limit["check"]: limit["source"] for limit in foreseen["steps"][0]["limits"]}
+    assert len(planned) == 4
+    assert planned == {name: sources[name] for name in planned}
 
 
 def test_the_method_gives_the_procedures_numbers_from_its_recordings(sqlite_client: Client, job: dict) -> None:

@@ -12,14 +12,17 @@ import pytest
 
 from bench_service.cli.asking.client import connect
 from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.reports.calibration_parts import found_by
 from bench_service.evidence.reports.result_report import gathered, result_report
 from bench_service.evidence.reports.unit_report import unit_report
 from bench_service.formats.certificate.document import certificate
 from bench_service.formats.certificate.laboratory import laboratory_of
 from bench_service.formats.certificate.rules import faults
 from bench_service.formats.certificate.signature import KeyPair, new_key, signed, verified
+from bench_service.model.calibrations import Approval
 from bench_service.persistence.stores import open_stores
 from bench_service.settings import Settings
+from procedures.core.limits import Verdict
 from tests.kit.pdf_a import attached, structural_faults, text_of
 from tests.kit.printed_words import words_of
 from tests.service.client import Client
@@ -217,6 +220,30 @@ def test_a_rejected_calibration_is_marked(calibrated: Calibrated) -> None:
     calibrated.client.http.post(f"{PATH}/{one['id']}/reject", json={"remark": "dropped the unit"})
     text = text_of(pdf(calibrated, "/api/v1/units/SIM-0001/report.pdf"))
     assert (one["id"] in text, "rejected" in text) == (True, True)
+
+
+def test_as_found_is_the_calibration_in_use_before_and_no_rejected_one_after_it(calibrated: Calibrated) -> None:
+    """A calibration that nobody used, rejected, lies between the two: its b0 of 0.01 rad/s is nowhere as found."""
+    books = f"sqlite:///{calibrated.books}"
+    stores, opened = open_stores(books)
+    try:
+        current = stores.calibrations.get(calibrated.second["gyro"])
+        first = stores.calibrations.get(calibrated.first["gyro"])
+        history = stores.calibrations.list("SIM-0001", limit=200).items
+        between = replace(first, id="between", made_at=current.made_at - timedelta(microseconds=1))
+        found = found_by(stores, current, [current, replace(between, approval=Approval.REJECTED), first])
+        words = words_of(unit_report(stores, "SIM-0001"))
+    finally:
+        opened.dispose()
+    assert current.id in {c.id for c in history}
+    assert found is not None
+    assert found.id == first.id
+    assert "attached" not in words
+    assert f"export of calibration {current.id}, format json" in words
+    entered = replace(current, result_id=None, verdict=None)
+    tried = replace(between, verdict=Verdict.FAIL)
+    assert found_by(stores, entered, [entered, tried, replace(first, verdict=None)]) == replace(first, verdict=None)
+    assert found_by(stores, entered, [entered, replace(between, approval=Approval.REJECTED)]) is None
 
 
 def test_pages_lead_to_the_reports(calibrated: Calibrated) -> None:

@@ -5,6 +5,7 @@ import io
 import json
 import zipfile
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -61,6 +62,8 @@ def test_a_chosen_calibration_corrects_and_means_are_taken_after_it(client: Clie
         ({"corrected_by": "none"}, 404, "calibration"),
         ({"values": "raw", "decimate": 5}, 422, "neither corrected nor decimated"),
         ({"format": "xls"}, 422, "parquet"),
+        ({"decimate": 100_000}, 422, "has no more samples there"),
+        ({"decimate": 100, "stop_s": 0.1}, 422, "1 … 40"),
     ):
         answer = client.http.get(f"/api/v1/recordings/{recording['id']}/samples", params=query)
         assert answer.status_code == status, answer.text
@@ -88,3 +91,44 @@ def test_a_job_without_recordings_and_an_unknown_job_are_refused(client: Client)
     idle = client.wait(client.submit("no_operation")["id"])
     answer = client.http.get(f"/api/v1/jobs/{idle['id']}/samples")
     assert (answer.status_code, "no complete recording" in answer.text) == (404, True)
+
+
+def test_names_of_files_tell_how_their_samples_were_treated(client: Client, job: dict) -> None:
+    recording, one = client.recordings(job["id"])[0]["id"], enter(client, "gyro")
+    for path, query, treated in (
+        ("data", {"format": "npy"}, ""),
+        ("data", {"format": "csv", "channels": "gyro_x"}, "-part"),
+        ("samples", {"values": "raw"}, "-raw"),
+        ("samples", {}, "-physical"),
+        ("samples", {"corrected_by": one["id"], "decimate": 10}, "-physical-corrected-means10"),
+        ("samples", {"stop_s": 1.0}, "-physical-part"),
+    ):
+        answer = client.http.get(f"/api/v1/recordings/{recording}/{path}", params=query)
+        name = f"{recording}{treated}-simulated.{query.get('format', 'csv')}"
+        assert answer.headers["Content-Disposition"] == f'attachment; filename="{name}"'
+
+
+def test_a_raw_zip_says_counts_and_how_to_scale_them(client: Client, job: dict) -> None:
+    query = {"format": "csv", "values": "raw"}
+    answer = client.http.get(f"/api/v1/jobs/{job['id']}/samples", params=query)
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        one = json.loads(archive.read("manifest.json"))["files"][0]
+        assert one["file"].endswith("-raw-simulated.csv")
+        raw = pd.read_csv(io.BytesIO(archive.read(one["file"])))
+    assert (one["units"]["time_s"], one["units"]["gyro_x"]) == ("s", "count")
+    said = next(c for c in one["columns"] if c["name"] == "gyro_x")
+    assert (said["unit"], said["quantity"]) == ("rad", "angle_increment")
+    recording = next(r for r in client.recordings(job["id"]) if r["id"] == one["recording_facts"]["recording"])
+    by_hand = float(said["scale"]) * (raw["gyro_x"] - float(said["offset"])) * recording["rate_hz"]
+    np.testing.assert_allclose(samples(client, recording)["gyro_x_rad_per_s"], by_hand, rtol=1e-14)
+
+
+def test_a_stretch_says_from_where_its_time_counts(client: Client, job: dict) -> None:
+    """time_s counts from the recording's first sample; start_s is the bench time of the stretch's own first one."""
+    recording = client.recordings(job["id"])[0]
+    query = {"format": "h5", "start_s": 1.0, "stop_s": 2.0}
+    answer = client.http.get(f"/api/v1/recordings/{recording['id']}/samples", params=query)
+    with h5py.File(io.BytesIO(answer.content)) as store:
+        zero, start = (float(store.attrs[name]) for name in ("bench_time_of_time_s_0", "start_s"))
+        assert (store["time_s"][0], zero) == (1.0, recording["start_s"])
+        assert start == pytest.approx(zero + store["time_s"][0], abs=1e-9)

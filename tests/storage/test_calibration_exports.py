@@ -10,6 +10,7 @@ import shutil
 import struct
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -228,6 +229,26 @@ def test_kalibr_noise_is_in_densities_and_has_no_bias_instability() -> None:
         "gyroscope_noise_density": 2e-5 * 3, "gyroscope_random_walk": 4e-8,
         "rostopic": "/imu0", "update_rate": 400.0,
     }  # fmt: skip
+
+
+def test_the_json_has_the_mounting_of_its_triads() -> None:
+    mounting = {"id": "m-1", "plate": "P2", "azimuth_deg": 12.5, "azimuth_sd_arcsec": 3.0}
+    subject = a_subject()
+    both = replace(subject, triads=tuple(replace(t, mounting=mounting) for t in subject.triads))
+    assert json.loads(own_json(both))["mounting"] == mounting
+    apart = replace(both, triads=(both.triads[0], subject.triads[1]))
+    document = json.loads(own_json(apart))
+    assert document["mounting"] is None
+    assert [t["mounting"] for t in document["triads"]] == [mounting, None]
+
+
+@pytest.mark.parametrize("form", ["kalibr", "kalibr-imu", "openvins"])
+def test_a_density_of_zero_is_refused_for_kalibr_takes_none(form: str) -> None:
+    """Kalibr's reader of imu.yaml raises for every density that is not above zero."""
+    subject = a_subject()
+    silent = tuple(replace(c, rate_random_walk=0.0) for c in subject.noise["gyro"])
+    with pytest.raises(BadParameter, match=r"rate random walk K of the gyros; declare .* PUT /api/v1/units/U-1"):
+        text(form, replace(subject, noise={**subject.noise, "gyro": silent}))
 
 
 def _parameters(lines: str, cut: Callable[[str], tuple[str, float]]) -> dict[str, float]:

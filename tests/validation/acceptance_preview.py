@@ -5,11 +5,10 @@ mean square of ν degrees of freedom, such as δ/√3 or the scatter of three la
 independent runs the observed mean square over that is χ²/(ν·n) of ν·n degrees of freedom (ν = 1 of an estimate): the
 interval. A value that is itself a claim ("3σ") is compared by its mean. Tests of significance have none.
 
-Four departures are known. The shipped table points to 0.5″ where 1″ is declared, so the terms of whole turns come out
-at half to two thirds of what is foreseen. The static run finds an averaging time of 110 s, and later dwells last so;
-the preview has the record's 70 s, so gyros come out at 0.75. A unit that was never calibrated is foreseen at nominal
-scale factors: with an accelerometers' K of 0.82, δ comes out 1.2 times as large; and without the share of the thermal
-correction, as the preview says.
+Three departures are known. The shipped table points to 0.5″ where 1″ is declared, so the terms of whole turns come out
+at half to two thirds of what is foreseen. A unit that was never calibrated is foreseen at nominal scale factors: with
+an accelerometers' K of 0.82, δ comes out 1.2 times as large; and without the share of the thermal correction, as the
+preview says.
 """
 
 import re

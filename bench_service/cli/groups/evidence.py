@@ -1,15 +1,13 @@
-"""Commands about evidence: recordings and results are listed, samples exported, methods run."""
+"""Commands about evidence: recordings and results are listed, methods run."""
 
 import json
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from bench_service.cli.asking.client import RESULT, call, check, connect, segment
+from bench_service.cli.asking.client import RESULT, call, connect, segment
 from bench_service.cli.asking.lists import newest, show
 from bench_service.cli.completion import method_names
-from bench_service.cli.files import check_folder, whole_file
 from bench_service.cli.groups.batches import selection_of, submit
 from bench_service.cli.options import NO_ITEMS, AsJson, Limit, Server, Set, console, parameter
 
@@ -60,46 +58,6 @@ def analyse(
         result = call(client, "POST", "/api/v1/analyses", RESULT, json=body)
     _print_result(method, result, as_json)
     return exit_code(result["verdict"])
-
-
-def export(
-    context: typer.Context,
-    recording: Annotated[str, typer.Argument(help="Id of a recording; of a job, where the file is a .zip")],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", dir_okay=False, help="File to write; its suffix is the format")
-    ],
-    channels: Annotated[str | None, typer.Option(help="Names, separated by commas; all without it")] = None,
-    start_s: Annotated[float | None, typer.Option(help="Begin, in seconds of the recording")] = None,
-    stop_s: Annotated[float | None, typer.Option(help="End, in seconds of the recording")] = None,
-    values: Annotated[
-        str | None, typer.Option(help="physical (SI, units in the names) or raw; without it, as stored")
-    ] = None,
-    corrected_by: Annotated[str | None, typer.Option(help="Calibrations that correct, ids separated by commas")] = None,
-    decimate: Annotated[int | None, typer.Option(min=1, help="Samples that one mean is taken over")] = None,
-    form: Annotated[str, typer.Option("--format", help="Format of the files in a .zip")] = "csv",
-    server: Server = None,
-) -> None:
-    """Take a recording's samples out as .csv, .parquet, .arrow, .npy, .feather, .h5, .mat or .mcap; a job's as .zip."""
-    options: dict[str, Any] = {"channels": channels, "start_s": start_s, "stop_s": stop_s}
-    treated = {"values": values, "corrected_by": corrected_by, "decimate": decimate}
-    ending = output.suffix.removeprefix(".")
-    path = f"/api/v1/recordings/{segment(recording)}/data"
-    if ending == "zip":
-        path = f"/api/v1/jobs/{segment(recording)}/samples"
-        ending = form
-    elif ending in ("feather", "h5", "mat", "mcap") or any(treated.values()):
-        path = f"/api/v1/recordings/{segment(recording)}/samples"
-    query = {"format": ending, **{k: v for k, v in {**options, **treated}.items() if v is not None}}
-    check_folder(output)
-    with (
-        connect(context.obj, server, drive=False) as client,
-        client.stream("GET", path, params=query) as response,
-    ):
-        check(response)
-        with whole_file(output) as sink:
-            for piece in response.iter_bytes():
-                sink.write(piece)
-    console.print(f"{output}: {output.stat().st_size} bytes")
 
 
 def recordings(

@@ -27,7 +27,7 @@ def check_table(document: dict[str, Any]) -> Table:
         outcome = Text(decided, style="green" if check["passed"] else "yellow" if is_inconclusive(check) else "red")
         expanded = "" if made.get("expanded_uncertainty") is None else f"{made['expanded_uncertainty']:.2g}"
         source = Text(limit.get("source", ""))
-        value = f"{'< ' if check.get('bound') else ''}{check['value']:.4g}"
+        value = "unbounded" if check["value"] is None else f"{'< ' if check.get('bound') else ''}{check['value']:.4g}"
         table.add_row(check["name"], value, expanded, ", ".join(bounds), limit["unit"], source, outcome)
     said: list[str] = []
     if (statement := document.get("statement")) is not None:

@@ -112,8 +112,11 @@ class ScpiSupply:
         return SupplyReading(self._clock.now_s(), on, voltage, current, mode == "CC", tripped, set_v, set_a, status)
 
     async def make_safe(self) -> None:
-        """Switch the output off and check that it is off. Implements `Supply.make_safe`."""
+        """Switch the output off and check that it is off; what comes next is switched on at the nominal voltage.
+        Implements `Supply.make_safe`.
+        """
         await self.switch_off()
+        self._wanted = None
 
     def close(self) -> None:
         """Drop the line; see `WireDevice`."""

@@ -6,9 +6,10 @@ from bench_service.evidence.reports.people_parts import moment, named
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.printed.digits import to_uncertainty, two_digits
 from bench_service.formats.printed.document import Block, Facts, Heading, PrintedTable
-from bench_service.model.calibrations import StoredCalibration
+from bench_service.model.calibrations import Approval, StoredCalibration
 from bench_service.model.records import StoredResult
 from procedures.core.imu_model import COEFFICIENT_NAMES
+from procedures.core.limits import Verdict
 from procedures.core.report import Figure, Series
 from procedures.core.units import DISPLAY
 
@@ -25,6 +26,20 @@ def found_before(stores: EvidenceStores, result: StoredResult) -> dict[str, Stor
     return {c.triad: c for c in stores.calibrations.several(unit.get("calibration_ids") or ())}
 
 
+def found_by(
+    stores: EvidenceStores, one: StoredCalibration, history: Sequence[StoredCalibration]
+) -> StoredCalibration | None:
+    """Return the calibration that was in use when another one of its triad was measured; None: there was none.
+
+    An entered one has no measurement: then it is the newest earlier one that neither failed nor was rejected.
+    `history`: calibrations of the triad, newest first.
+    """
+    if one.result_id is not None:
+        return found_before(stores, stores.results.get(one.result_id)).get(one.triad)
+    fit = (c for c in history if c.approval is not Approval.REJECTED and c.verdict in (None, Verdict.PASS))
+    return next((c for c in fit if c.made_at < one.made_at and c.id != one.id), None)
+
+
 def found_and_left(stores: EvidenceStores, one: StoredCalibration, found: StoredCalibration | None) -> Iterator[Block]:
     """Coefficients of a calibration as left next to those as found, and their trend up to it.
 
@@ -37,9 +52,13 @@ def found_and_left(stores: EvidenceStores, one: StoredCalibration, found: Stored
     yield from trends(same, one.triad)
 
 
-def coefficients(one: StoredCalibration, found: StoredCalibration | None) -> Iterator[Block]:
+def coefficients(
+    one: StoredCalibration,
+    found: StoredCalibration | None,
+    covariance: str = "The whole covariance is in the attached document.",
+) -> Iterator[Block]:
     """Yield blocks on a calibration as left: values to their uncertainty with those as found, then all values
-    unrounded.
+    unrounded. `covariance`: sentence on where the whole covariance is.
     """
     yield Facts(tuple(facts(one)))
     before = {} if found is None else {c.name: c for c in found.coefficients}
@@ -67,7 +86,7 @@ def coefficients(one: StoredCalibration, found: StoredCalibration | None) -> Ite
         ("coefficient", "unit", "value", "standard uncertainty"),
         exact,
         (2, 3),
-        "The whole covariance is in the attached document.",
+        covariance,
     )
 
 

@@ -162,7 +162,7 @@ def _check(c: dict[str, Any]) -> tuple[str, ...]:
     return (
         decision.get("outcome") or ("pass" if c["passed"] else "fail"),
         c["name"],
-        ("< " if c.get("bound") else "") + to_uncertainty(c["value"], expanded),
+        "unbounded" if c["value"] is None else ("< " * c.get("bound", False)) + to_uncertainty(c["value"], expanded),
         "–" if expanded is None else two_digits(expanded),
         "–" if expanded is None else f"{factor:.3g}",
         " and ".join(bounds),

@@ -24,7 +24,7 @@ def unit_report(stores: EvidenceStores, serial: str) -> PrintedDocument:
     corrections = stores.corrections.list(serial, limit=200).items
     notes = stores.unit_notes.list(serial, limit=people_parts.REMARKS).items
     blocks: list[Block] = [*_identity(unit), *people_parts.remarks(notes), *_noise(stores, unit, results)]
-    blocks += [*_calibrations(history), *_corrections(corrections), *_results(results)]
+    blocks += [*_calibrations(stores, history), *_corrections(corrections), *_results(results)]
     moments = [c.made_at for c in (*history, *corrections)] + [r.created_at for r in results] + [n.at for n in notes]
     moments += [d.at for c in (*history, *corrections) for d in c.decisions]
     newest = max(moments, default=datetime.fromisoformat("1970-01-01T00:00:00+00:00"))
@@ -64,8 +64,8 @@ def _noise(stores: EvidenceStores, unit: Unit, results: tuple[StoredResult, ...]
         yield from noise_parts.noise_trends(stores, unit.serial, results[0].simulated)
 
 
-def _calibrations(history: tuple[StoredCalibration, ...]) -> Iterator[Block]:
-    """The calibration in use of each triad beside the one before it, then the history and its trends."""
+def _calibrations(stores: EvidenceStores, history: tuple[StoredCalibration, ...]) -> Iterator[Block]:
+    """The calibration in use of each triad beside that as found, then the history and its trends."""
     if any(c.simulated for c in history):
         yield Paragraph("SIMULATED: calibrations of this unit come from a simulated bench.", warning=True)
     for triad in TRIADS:
@@ -75,8 +75,9 @@ def _calibrations(history: tuple[StoredCalibration, ...]) -> Iterator[Block]:
         if current is None:
             yield Paragraph("None is in use.")
         else:
-            older = [c for c in of_triad if c.made_at < current.made_at]
-            yield from calibration_parts.coefficients(current, older[0] if older else None)
+            found = calibration_parts.found_by(stores, current, of_triad)
+            where = f"The whole covariance is in the export of calibration {current.id}, format json."
+            yield from calibration_parts.coefficients(current, found, where)
         yield from calibration_parts.trends(of_triad, triad)
     if history:
         rows = tuple(

@@ -10,6 +10,7 @@ import numpy as np
 from bench_service.formats.calibration_exports.algebra import triangle_and_rotation
 from bench_service.formats.calibration_exports.subject import CalibrationSubject, commented
 from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter
 
 FRAME = (
     "the IMU frame of this file is Q times the unit's frame of the calibration (R_imu_from_unit): a mounting rotation",
@@ -19,9 +20,10 @@ FRAME = (
 
 def kalibr_noise(subject: CalibrationSubject) -> str:
     """Return the text of Kalibr's imu.yaml: noise of the noisiest channel, in densities. Raises `BadParameter` where a
-    noise is unknown.
+    noise is unknown or zero.
     """
     subject.require_noise("kalibr-imu")
+    _require_densities(subject, "kalibr-imu")
     lines = commented(subject, "#", *_noise_remarks(subject))
     return "\n".join([*lines, *_noise(subject), "rostopic: /imu0", f"update_rate: {_number(subject.rate_hz)}"]) + "\n"
 
@@ -32,6 +34,7 @@ def kalibr_intrinsics(subject: CalibrationSubject) -> str:
     lines = commented(subject, "#", *FRAME, *_lost(subject))
     lines += ["imu0:", *_identity("  T_i_b", 4)]
     if len(subject.noise) == 2:
+        _require_densities(subject, "kalibr")
         lines += [f"  {line}" for line in _noise(subject)]
     lines += ["  accelerometers:", *_matrix("    M", force)]
     lines += [
@@ -50,6 +53,7 @@ def openvins(subject: CalibrationSubject) -> str:
     Raises `BadParameter`.
     """
     subject.require_noise("openvins")
+    _require_densities(subject, "openvins")
     force, rate, turn, rotation = _split(subject, "openvins")
     lines = ["%YAML:1.0", "---", *commented(subject, "#", *FRAME, *_noise_remarks(subject), *_lost(subject))]
     lines += ["imu0:", *_identity("  T_i_b", 4), *(f"  {line}" for line in _noise(subject))]
@@ -87,14 +91,32 @@ def _noise_remarks(subject: CalibrationSubject) -> list[str]:
     return [*origin, "densities of the noisiest channel; quantization, bias instability and ramp have no field here"]
 
 
-def _noise(subject: CalibrationSubject) -> list[str]:
-    """Densities N [rate/√Hz] and K [rate/s/√Hz]; the bias instability belongs in no field."""
-    lines: list[str] = []
+def _densities(subject: CalibrationSubject) -> dict[str, tuple[float, str]]:
+    """Fields with densities N [rate/√Hz] and K [rate/s/√Hz], and each in words; the bias instability belongs in no
+    field.
+    """
+    found: dict[str, tuple[float, str]] = {}
     for key, name in (("accelerometer", "accelerometer"), ("gyroscope", "gyro")):
         channels = subject.noise[name]
-        lines.append(f"{key}_noise_density: {_number(max(c.random_walk for c in channels))}")
-        lines.append(f"{key}_random_walk: {_number(max(c.rate_random_walk for c in channels))}")
-    return lines
+        found[f"{key}_noise_density"] = max(c.random_walk for c in channels), f"random walk N of the {name}s"
+        found[f"{key}_random_walk"] = max(c.rate_random_walk for c in channels), f"rate random walk K of the {name}s"
+    return found
+
+
+def _require_densities(subject: CalibrationSubject, form: str) -> None:
+    """Check that all densities are above zero, as Kalibr's reader does. Raises `BadParameter` with the way out."""
+    zeros = [words for value, words in _densities(subject).values() if not value > 0.0]
+    if zeros:
+        allowed = (
+            f"a unit whose noise densities are above zero, for Kalibr and OpenVINS take no other: 0 (declared so, or "
+            f"not observed) is the {', the '.join(zeros)}; declare a bound with PUT /api/v1/units/{subject.unit}, or "
+            "take format json, pyins or navego"
+        )
+        raise BadParameter("format", form, allowed)
+
+
+def _noise(subject: CalibrationSubject) -> list[str]:
+    return [f"{key}: {_number(value)}" for key, (value, _) in _densities(subject).items()]
 
 
 def _matrix(key: str, matrix: Array) -> list[str]:

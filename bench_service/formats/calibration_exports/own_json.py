@@ -33,12 +33,18 @@ def own_json(subject: CalibrationSubject) -> str:
         "exported_at": subject.exported_at,
         "formula": FORMULA,
         "frame": FRAME,
-        "mounting": None,
+        "mounting": _mounting(subject),
         "remarks": list(subject.remarks()),
         "triads": [_triad(t) for t in subject.triads],
         "noise": {name: _noise(subject, name) for name in subject.noise},
     }
     return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _mounting(subject: CalibrationSubject) -> dict[str, Any] | None:
+    """The mounting of all triads; None where there was none, or each had its own."""
+    first = subject.triads[0].mounting
+    return first if all(t.mounting == first for t in subject.triads) else None
 
 
 def _triad(one: TriadExport) -> dict[str, Any]:
@@ -65,6 +71,7 @@ def _triad(one: TriadExport) -> dict[str, Any]:
         ],
         "covariance": {"order": list(COEFFICIENT_NAMES), "matrix": [list(row) for row in value.covariance]},
         "inverse_covariance": {"order": list(INVERSE_NAMES), "matrix": inverse.covariance.tolist()},
+        "mounting": one.mounting,
         "temperature_c": None if one.temperature_c is None else list(one.temperature_c),
         "validity": {
             "approval": one.approval,

@@ -32,6 +32,8 @@ class TriadExport:
     """Lowest and highest chamber temperature of its stations [°C]; None: no station set one."""
     lineage: dict[str, Any] | None = None
     """Result, recordings with their hashes, parameters and code; None for entered coefficients."""
+    mounting: dict[str, Any] | None = None
+    """Mounting on which its job rested: id, plate, azimuth with its uncertainty; None: none was entered."""
 
     @property
     def triad(self) -> str:

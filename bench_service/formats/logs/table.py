@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,15 @@ class Log(Protocol):
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:
         """Yield blocks of rows: for each named column its raw values, (n,). Raises `UnreadableFile`."""
         ...
+
+
+@runtime_checkable
+class SelfDescribing(Protocol):
+    """A log whose format has a place for facts about itself and about its columns, as name -> text. Interface."""
+
+    facts: dict[str, str]
+    column_facts: dict[str, dict[str, str]]
+    """By the name of a column."""
 
 
 class LogFormat(Protocol):

@@ -77,6 +77,11 @@ class Zipped:
                 "is a zip archive or a workbook without a table of text in it: unpack it, or save the sheet as CSV",
             )
 
+    @property
+    def members(self) -> tuple[str, ...]:
+        """Names of the texts in the archive that are tables."""
+        return tuple(self._looks)
+
     def _found_drives(self, names: set[str]) -> dict[str, "_Drive"]:
         """Group the samples of KITTI's drives by their folder: oxts, or what was packed from inside of it."""
         folders: dict[str, list[str]] = {}

@@ -2,18 +2,24 @@
 give.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, BinaryIO
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from bench_service.formats.bounds import quoted
 from bench_service.formats.columnar import is_columnar
 from bench_service.formats.errors import UnreadableFile
+from bench_service.formats.logs.arrays_by_name.tables import with_unit
 from bench_service.formats.logs.dialects import Understood, guessed, in_dialect
 from bench_service.formats.logs.names import is_time, time_unit
 from bench_service.formats.logs.table import LogClock, LogColumn, LogTable
 from bench_service.formats.text_look import TextLook, look
+
+FACTORS = ("scale", "offset", "scale_factor", "add_offset")
+"""Metadata of a column by which its numbers are converted, in more than one convention."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +57,24 @@ def _columnar(stream: BinaryIO, name: str) -> Table:
         if typed or is_time(item.name):
             clocks.append(LogClock(item.name, None, f"column {item.name!r}"))
             units[item.name] = item.type.unit if typed else (time_unit(item.name) or "")
-        columns.append(guessed(item.name))
+        columns.append(_stated(guessed(item.name), item.metadata or {}))
     title = "Parquet" if parquet else "Arrow"
     return Table(title.lower(), title, LogTable("", tuple(columns), tuple(clocks), None, rows), units)
+
+
+def _stated(column: LogColumn, metadata: Mapping[bytes, bytes]) -> LogColumn:
+    """Give a column the unit of its metadata; a scale or an offset there, in whatever convention, becomes a doubt."""
+    if column.quantity is None:
+        return column
+    said = {key.decode("utf-8", "replace").lower(): value.decode("utf-8", "replace") for key, value in metadata.items()}
+    unit = said.get("unit") or said.get("units") or ""
+    if unit.strip():
+        column = with_unit(column, unit, "column")
+    factors = [f"{key} = {quoted(said[key])}" for key in FACTORS if said.get(key)]
+    if factors and not column.doubt:
+        doubt = f"its metadata say {', '.join(factors)}: give scale and offset, value = scale*(raw - offset)"
+        column = replace(column, doubt=doubt)
+    return column
 
 
 def _text(found: TextLook, name: str) -> Table:

@@ -10,9 +10,10 @@ from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.import_request import ImportFile
 from bench_service.formats.joined_files import Opened
-from bench_service.formats.logs.registry import format_of
+from bench_service.formats.logs.registry import TABLES, format_of
 from bench_service.formats.logs.table import LogColumn, LogTable, find_table
-from bench_service.formats.own_export import OwnExport, own_export
+from bench_service.formats.own_exports.model import OwnExport
+from bench_service.formats.own_exports.recognition import is_named_simulated, own_export
 from bench_service.formats.proposal.choice import chosen_columns, chosen_table, missing_axes, other_tables
 from bench_service.formats.proposal.inspection import Values, inspected, values_of
 from bench_service.formats.proposal.model import InspectedClock, Proposal, ProposedColumn, ProposedTable
@@ -32,40 +33,60 @@ def propose(file: ImportFile, unit: str | None, form: str | None, table: str | N
     `BadParameter`.
     """
     found = format_of(file.stream, form)
-    if found is None:
-        own = own_export(file.stream)
-        if own is not None:
-            return _of_own(file, own, unit)
+    opened = Opened(file, None if found is None else found.opened(file.stream, file.name))
+    own = own_export(opened)
+    if own is not None and own.channels:
+        return _of_own(opened, own, unit, form).model_copy(update={"format": TABLES if found is None else found.NAME})
+    if unit is None and own is not None:
+        unit = own.facts["unit"]
+    if found is None or opened.log is None:
         looked = table_of(file.stream, file.name)
-        return _proposed([Opened(file, None)], looked, [looked.table], unit, form)
-    log = found.opened(file.stream, file.name)
+        return _marked(_proposed([opened], looked, [looked.table], unit, form), opened, own)
+    log = opened.log
     tables = log.tables()
     if not tables:
         raise UnreadableFile(file.name, "; ".join(["holds no table of samples", *log.warnings]))
     chosen = chosen_table(tables) if table is None else find_table(log, file.name, table, [])
     fields = {"table": chosen.name} if len(tables) > 1 else {}
     looked = Table(found.NAME, found.TITLE, chosen, fields=fields)
-    proposal = _proposed([Opened(file, log)], looked, tables, unit, form)
+    proposal = _marked(_proposed([opened], looked, tables, unit, form), opened, own)
     return proposal.model_copy(update={"suspicious": [*log.warnings, *proposal.suspicious]})
 
 
-def _of_own(file: ImportFile, own: OwnExport, unit: str | None) -> Proposal:
-    """Propose what an export of ours says of itself."""
-    fields = own.description()
-    if unit is not None:
-        fields["unit"] = unit
-    channels = [dict(channel) for channel in own.channels]
-    values = values_of([Opened(file, None)], {}, channels)
+def _marked(proposal: Proposal, opened: Opened, own: OwnExport | None) -> Proposal:
+    """Keep what a file says of its origin, where the rest of its description is read off as of any file."""
+    simulated = is_named_simulated(opened) or (own is not None and own.simulated)
+    notes, description = list(proposal.notes), dict(proposal.description)
+    if own is not None:
+        notes = [f"an export of our recording {own.facts['recording']}", *notes]
+    if simulated:
+        description["simulated"] = True
+        notes = ["it says that it is simulated: what comes of it stays marked as simulated", *notes]
+    cautions = [] if own is None else own.cautions()
+    return proposal.model_copy(
+        update={"notes": notes, "description": description, "suspicious": [*cautions, *proposal.suspicious]}
+    )
+
+
+def _of_own(opened: Opened, own: OwnExport, unit: str | None, form: str | None) -> Proposal:
+    """Propose what an export of ours says of itself. Raises `UnreadableFile`."""
+    try:
+        fields = own.description()
+        if unit is not None:
+            fields["unit"] = unit
+        if form is not None:
+            fields["format"] = form
+        ImportDescription.model_validate(fields)
+    except ValueError as error:
+        words = f"its own description cannot be used: {' '.join(str(error).split())[:300]}"
+        raise UnreadableFile(opened.file.name, words) from error
+    values = values_of([opened], {} if form is None else {"format": form}, fields["channels"])
     if np.any(values.finite < values.rows):
         fields["gaps"] = "mark"
-    ImportDescription.model_validate(fields)
-    notes = [f"an export of our recording {own.facts['recording']}: its description is as it was"]
-    if not own.is_whole or str(values.rows) != own.facts.get("samples_of_whole_recording"):
-        notes.append("it is a part of the recording")
     return Proposal(
-        format="table",
+        format=TABLES,
         title="our own export" + (", of a simulated recording" if own.simulated else ""),
-        file=file.name,
+        file=opened.file.name,
         table=None,
         rows=values.rows,
         rate_hz=fields["rate_hz"],
@@ -74,8 +95,8 @@ def _of_own(file: ImportFile, own: OwnExport, unit: str | None) -> Proposal:
         clocks=[],
         tables=[],
         unknown=[],
-        suspicious=[],
-        notes=notes,
+        suspicious=own.cautions(),
+        notes=own.notes(values.rows),
     )
 
 

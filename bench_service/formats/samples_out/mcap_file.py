@@ -134,8 +134,8 @@ def _schema() -> bytes:
 
 
 def _channel(sheet: Sheet) -> bytes:
-    facts = {"recording": sheet.about.get("recording", ""), "unit": sheet.about.get("unit", "")}
-    return _record(CHANNEL, struct.pack("<HH", 1, 1) + _string(TOPIC) + _string("cdr") + _map(facts))
+    """The channel with the facts of the sheet, which programs that write bags anew keep with it."""
+    return _record(CHANNEL, struct.pack("<HH", 1, 1) + _string(TOPIC) + _string("cdr") + _map(sheet.about))
 
 
 def _record(opcode: int, body: bytes) -> bytes:

@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from bench_service.formats.chunk import arrow_array
+from bench_service.formats.samples_out.distinct_names import distinct
 from bench_service.formats.samples_out.mcap_file import mcap
 from bench_service.formats.samples_out.sheet import Sheet
 from procedures.core.errors import BadParameter
@@ -24,6 +25,13 @@ from procedures.core.errors import BadParameter
 PIECE = 1 << 20
 MOST_IN_MATLAB = 8_000_000
 """Numbers of one MATLAB file: 64 MB, and as much again while it is written."""
+
+LONGEST_IN_MATLAB = 63
+"""Most letters of a name in MATLAB, of a variable as of a field."""
+STRUCTS_IN_MATLAB = ("about", "units", "channels")
+"""Variables of a MATLAB file that are no columns."""
+NUMBERS = ("scale", "offset")
+"""Attributes of a column that are numbers."""
 
 
 class SheetFormat(StrEnum):
@@ -147,17 +155,23 @@ def _hdf5(sheet: Sheet) -> Iterator[bytes]:
 
 
 def _matlab(sheet: Sheet) -> Iterator[bytes]:
-    """One column vector a column, and the structs `about` and `units`."""
+    """One column vector a column, and the structs `about`, `units` and `channels`; `units` are those of the numbers as
+    they are, and ``scale·(raw − offset)`` is in the unit of `channels`.
+    """
     from scipy.io import savemat
 
     blocks = list(sheet.blocks)
-    names = [_matlab_name(c.name) for c in sheet.columns]
+    names = distinct([_matlab_name(c.name) for c in sheet.columns], LONGEST_IN_MATLAB, STRUCTS_IN_MATLAB)
     variables: dict[str, Any] = {
         name: np.concatenate([block[i] for block in blocks]) if blocks else np.zeros(0, sheet.columns[i].kind)
         for i, name in enumerate(names)
     }
     variables["about"] = dict(sheet.about)
-    variables["units"] = {name: c.attributes["unit"] for name, c in zip(names, sheet.columns, strict=True)}
+    variables["units"] = {name: c.unit_of_numbers for name, c in zip(names, sheet.columns, strict=True)}
+    variables["channels"] = {
+        name: {"column": c.name} | {k: float(v) if k in NUMBERS else v for k, v in c.attributes.items()}
+        for name, c in zip(names, sheet.columns, strict=True)
+    }
     out = io.BytesIO()
     savemat(cast("Any", out), variables, format="5", oned_as="column", long_field_names=True)
     data = out.getbuffer()
@@ -166,9 +180,9 @@ def _matlab(sheet: Sheet) -> Iterator[bytes]:
 
 
 def _matlab_name(name: str) -> str:
-    """A name that MATLAB takes: letters, digits and underscores, at most 63."""
+    """A name of letters, digits and underscores, as MATLAB takes it."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
-    return (plain if plain[:1].isalpha() else f"c_{plain}")[:63]
+    return plain if plain[:1].isalpha() else f"c_{plain}"
 
 
 def _pieces(file: IO[bytes]) -> Iterator[bytes]:

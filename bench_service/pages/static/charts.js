@@ -150,7 +150,7 @@ function positive(series, figure) {
 export function bar(canvas) {
   const { value, sigma, minimum, maximum } = Object.fromEntries(Object.entries(canvas.dataset).map(([k, v]) => [k, v === "" ? null : Number(v)]));
   const ends = [minimum, maximum].filter((v) => v !== null), u = sigma || 0, all = [...ends, value - 2 * u, value + 2 * u];
-  if (!ends.length || !all.every(Number.isFinite)) return;
+  if (value === null || !ends.length || !all.every(Number.isFinite)) return;
   let low = Math.min(...all), high = Math.max(...all);
   const pad = (high - low || 1) * 0.12, context = canvas.getContext("2d");
   low -= pad; high += pad;

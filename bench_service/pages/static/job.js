@@ -3,6 +3,7 @@ import { read, part, send } from "./api.js";
 import { Strip } from "./charts.js";
 import { fill, h, moment, doubt, number, shownIn, span } from "./dom.js";
 import * as feed from "./feed.js";
+import { interlocks } from "./interlocks.js";
 import { attitude } from "./table3d.js";
 import { reload } from "./turns.js";
 import { t } from "./words.js";
@@ -91,12 +92,10 @@ function devices(found, commanded) {
   at("devices").textContent = `${t("Table")} ${angles.map((angle) => `${angle.toFixed(4)}°`).join(" ")} ${found.moving ? t("moving") : t("at rest")}`
     + (commanded ? `; ${t("commanded")} ${commanded.map((angle) => `${angle.toFixed(1)}°`).join(" ")}` : "") + `; ${t("unit")} ${found.unit_on ? t("on") : t("off")}`
     + (c ? `; ${t("chamber")} ${c.air_c.toFixed(1)} °C, ${t("set point")} ${c.set_point_c.toFixed(1)} °C` : "");
+  interlocks(at("interlocks"), found);
   if (!c) return;
   chamber = chamber || strip("chamber", t("chamber"), "degC", [t("air"), t("set point"), t("target")]);
   chamber.add(c.time_s, [c.air_c, c.set_point_c, c.target_c]);
-  const causes = [c.door_open && t("the chamber's door is open"), c.tripped && t("the over-temperature limiter has tripped")].filter(Boolean);
-  const place = at("interlocks"), text = causes.length ? `${t("Interlock:")} ${causes.join(", ")}` : "";
-  if (place.dataset.text !== text) { place.dataset.text = text; place.className = text ? "warning" : ""; place.replaceChildren(...(text ? [text, " ", moment(new Date().toISOString())] : [])); }
 }
 
 function live({ live: found }) {

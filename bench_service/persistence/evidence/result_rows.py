@@ -1,6 +1,7 @@
 """Results and their numbers as rows and back. Knows the shapes only; no transaction begins here."""
 
 from collections.abc import Iterable
+from math import isfinite
 from typing import Any
 
 from bench_service.mapping import copied
@@ -22,8 +23,10 @@ def row_of_result(result: StoredResult, document: dict[str, Any]) -> ResultRow:
 
 
 def quantity_rows(result: StoredResult, elsewhere: frozenset[str]) -> list[ResultQuantityRow]:
-    """Build the rows that hold the numbers of a result's document, but not those that are stored elsewhere."""
-    found = quantities(result.document).values()
+    """Build the rows that hold the numbers of a result's document, but not those that are stored elsewhere, nor what is
+    unbounded.
+    """
+    found = [q for q in quantities(result.document).values() if isfinite(q.value)]
     return [copied(ResultQuantityRow, q, result_id=result.id) for q in found if q.name not in elsewhere]
 
 

@@ -27,6 +27,12 @@ class ChannelResult(Part):
     """Information criterion of the scale's polynomial, by order"""
     zero_bic: tuple[float, ...]
     """Information criterion of the zero's polynomial, by order"""
+    scale_p_values: tuple[float, ...] = ()
+    """F tests of order 2 against 1, 3 against 2; empty in results of older versions, whose order had the least
+    BIC.
+    """
+    zero_p_values: tuple[float, ...] = ()
+    """F tests of the zero's polynomial: order 2 against 1, 3 against 2"""
 
 
 class ConverterBenchDocument(Part):

@@ -42,8 +42,8 @@ class Check(Part):
 
     name: str
     """Name"""
-    value: float
-    """Value, in `unit` where there is one"""
+    value: float | None
+    """Value in the limit's unit; None: an upper bound that is infinite, as nothing bounds what was not observed."""
     limit: Limit
     """Limit that the value is held to"""
     passed: bool
@@ -59,7 +59,7 @@ class Check(Part):
     significance: bool = False
     """True for a test of significance: the value is a p-value and the limit its level."""
     bound: bool = False
-    """True: nothing was observed, and the value is what it stays below."""
+    """True: nothing was observed, and the value is what it stays below; a value of None: it is unbounded."""
 
 
 Verdict = Literal["pass", "fail", "error"]

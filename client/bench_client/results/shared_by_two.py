@@ -190,9 +190,11 @@ class Reading(Part):
     lower: float | None = None
     """Lower end of the interval at the requested confidence."""
     upper: float | None = None
-    """Upper end of the interval at the requested confidence."""
+    """Upper end of the interval at the requested confidence; None with a lower end: it is infinite."""
     upper_limit: float | None = None
-    """The coefficient is below this with a probability of 95 % (one-sided), observed or not."""
+    """The coefficient is below this with a probability of 95 % (one-sided), observed or not; None where
+    `unbounded`, and where the method gives none.
+    """
     p_value: float | None = None
     """Probability of such data without the process."""
     from_s: float | None = None
@@ -201,6 +203,8 @@ class Reading(Part):
     """Range of cluster times on the plot where a graphical value was read [s]"""
     described: bool = True
     """False: the noise model does not describe the part of the record that determines this; the limit still holds."""
+    unbounded: bool = False
+    """True: no finite limit holds the coefficient from above, however large it is the record could hide it."""
 
 
 class LaunchResultsCoefficient(Part):

@@ -200,7 +200,9 @@ class GyroTemperature(Part):
 
 
 class GyroNoise(Part):
-    """Noise of one gyro in one run (thesis table 4.7), with the unit's known noise to compare. None: not observed."""
+    """Noise of one gyro in one run (thesis table 4.7), with the unit's known noise to compare. None as a
+    coefficient: not observed.
+    """
 
     run: str
     """Run of the thermal cycle, by name"""
@@ -214,8 +216,8 @@ class GyroNoise(Part):
     """Bias instability B"""
     uncertainties: tuple[float | None, ...]
     """Standard uncertainties of Q, N and B; null: not observed"""
-    upper_limits: tuple[float, ...]
-    """Upper limits of Q, N and B (95 %, one-sided), observed or not"""
+    upper_limits: tuple[float | None, ...]
+    """Upper limits of Q, N and B (95 %, one-sided), observed or not; None: unbounded."""
     known: tuple[float, ...] | None
     """Q, N and B of the unit's record, for comparison; null: not known"""
 

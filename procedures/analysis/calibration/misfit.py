@@ -17,7 +17,7 @@ from procedures.analysis.calibration.magnitude import magnitude_gradient
 from procedures.analysis.calibration.scalar import ScalarFit
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.limits import Check, Limit, check
+from procedures.core.limits import OURS, Check, Limit, check
 
 MISFIT_MAX = 5.0
 """Residuals so many times the scatter within the poses fail. One pose of real units has two to three: hands creep and
@@ -66,11 +66,11 @@ class Misfit:
             )
         return ()
 
-    def checks(self, name: str, limit: float) -> tuple[Check, ...]:
+    def checks(self, name: str, limit: float, source: str = OURS) -> tuple[Check, ...]:
         """Return the check of the ratio against its limit; nothing where no equation is left to check with."""
         if self.ratio is None:
             return ()
-        bound = Limit("1", maximum=limit, source="ours")
+        bound = Limit("1", maximum=limit, source=source)
         return (check(name, self.ratio, bound, note=f"worst: {self.worst}"),)
 
 

@@ -186,14 +186,8 @@ def bring_to_reference(
     found = station_temperatures(recordings, lag_s, sensors, correction.thermometers)
     case, converter = found.static_c, found.converter_c
 
-    def staged(converter_c: Array) -> Array:
-        stage = correction.first_stage
-        return means.outputs if stage is None else at_reference(means.outputs, converter_c, stage)
-
     def brought(case_c: Array, converter_c: Array) -> Array:
-        felt = correction.apply(staged(converter_c), case_c, converter_c, 0.0)
-        scale, bias = (np.array([getattr(a, n) for a in correction.axes]) for n in ("scale", "bias_m_s2"))
-        return felt / scale - bias
+        return correction.at_reference(means.outputs, case_c, converter_c)
 
     outputs = brought(case, converter)
     by_sensor = [
@@ -201,7 +195,9 @@ def bring_to_reference(
     ]
     spreads = (found.mean_sd_c[:, :-1], found.mean_sd_c[:, -1:])
     of_sensors = np.sum([(d * sd) ** 2 for d, sd in zip(by_sensor, spreads, strict=True)], axis=0)
-    first, own = staged(converter), [case if case.ndim == 1 else case[:, i] for i in range(3)]
+    stage = correction.first_stage
+    first = means.outputs if stage is None else at_reference(means.outputs, converter, stage)
+    own = [case if case.ndim == 1 else case[:, i] for i in range(3)]
     of_correction = [_of_correction(axis, first[:, i], own[i], converter) for i, axis in enumerate(correction.axes)]
     references = correction.axes[0].case_reference_c, correction.axes[0].converter_reference_c
     return AtReference(

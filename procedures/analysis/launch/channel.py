@@ -206,8 +206,11 @@ def _of_line(line: Line | None) -> Reading:
 
 def _of(estimate: Estimate) -> Reading:
     e = estimate
-    limit = e.upper_limit if np.isfinite(e.upper_limit) else None
-    return Reading(e.value, e.standard_uncertainty, e.lower, e.upper, limit, e.p_value, described=e.described)
+    upper = None if e.upper is None or not np.isfinite(e.upper) else e.upper
+    unbounded = not np.isfinite(e.upper_limit)
+    limit = None if unbounded else e.upper_limit
+    of_limits = {"described": e.described, "unbounded": unbounded}
+    return Reading(e.value, e.standard_uncertainty, e.lower, upper, limit, e.p_value, **of_limits)
 
 
 def _averaging(fit: NoiseFit) -> Averaging:

@@ -51,12 +51,13 @@ class ChannelSummary:
         return tuple(m.process for m in self.means if m.mean is None)
 
     def noise_over(self, known: NoiseCoefficients | None) -> NoiseCoefficients:
-        """Return the coefficients for a unit's record; one that the model does not describe keeps its `known` value, or
-        limit.
+        """Return the coefficients for a unit's record; one that the model does not describe, or that no launch bounds,
+        keeps its `known` value, or limit.
         """
         changed: dict[str, float] = {}
         for m in self.means:
-            if m.mean is None and not all(reading.described for reading in m.values):
+            learnt = all(reading.described for reading in m.values) and not all(r.unbounded for r in m.values)
+            if m.mean is None and not learnt:
                 limits = [r.upper_limit for r in m.values if r.upper_limit is not None]
                 changed[m.process] = min(limits, default=0.0) if known is None else getattr(known, m.process)
         return replace(self.noise, **changed)

@@ -1,6 +1,6 @@
 """Disagreements of the three methods for noise coefficients, as sentences. Numbers are relative, without unit."""
 
-from math import hypot
+from math import hypot, isfinite
 
 from procedures.analysis.allan.read_off import Line, ReadOff
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
@@ -37,6 +37,8 @@ def _sentence(process: str, method: str, found: tuple[float, float] | None, refe
     value, sd = found
     if reference.value is None or reference.standard_uncertainty is None:
         limit = f"{reference.upper_limit / value:.2g} times that" if value > 0.0 else "above that"
+        if not isfinite(reference.upper_limit):
+            return [f"{head} shows it, the likelihood does not, and gives no finite limit: it is unbounded."]
         return [f"{head} shows it, the likelihood does not; its 95 % limit is {limit} value."]
     apart = abs(value - reference.value) / hypot(sd, reference.standard_uncertainty)
     if apart < APART:

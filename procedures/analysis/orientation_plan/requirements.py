@@ -123,7 +123,11 @@ def _of_dwells(plan: TriadPlan) -> Array | None:
 
 
 def in_run_check(
-    plan: TriadPlan, maximum: float | None, covariance: Array | None, level: float = IN_RUN_LEVEL
+    plan: TriadPlan,
+    maximum: float | None,
+    covariance: Array | None,
+    level: float = IN_RUN_LEVEL,
+    source: str = IN_RUN_SOURCE,
 ) -> PlannedCheck:
     """Planned check of the error per axis δ/√3 of n stations, its limit in the triad's unit of display.
 
@@ -139,7 +143,7 @@ def in_run_check(
     freedom = None if covariance is None else effective_freedom(covariance)
     own = None
     if maximum is not None:
-        limit = Limit(display, maximum=maximum, source=IN_RUN_SOURCE)
+        limit = Limit(display, maximum=maximum, source=source)
     elif floor is not None and freedom is not None:
         factor, own = float(np.sqrt(chdtri(freedom, level) / freedom)), level
         source = f"expanded uncertainty of the plan, k = {factor:.3g} at a level of {level:g} (ν = {freedom:.2g})"

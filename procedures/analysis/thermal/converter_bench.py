@@ -2,7 +2,8 @@
 
 The two stations of a soak are minutes apart, so the sensor does not read quite the same at both. Codes are brought to
 the mean of the two readings with the model itself, which is fitted again; the drift within a soak being small, it has
-settled after `PASSES`. The order of each function is that of the least Bayesian information criterion.
+settled after `PASSES`. The order of each function is the highest whose last term an F test finds (`LEVEL`): with the
+ten or so values that a bench gives, the Bayesian criterion took an order too many in a quarter of the functions.
 
 The source's errors are constant over the job: a gain g and a zero z make ``K0·(1 + g)`` and ``N0 + K0·z`` of the model,
 and leave Fc and the change Fs as they are. So its declared accuracy adds to the variances of K0 and N0 alone.
@@ -16,6 +17,7 @@ import numpy as np
 from procedures.analysis.cells import cell_means
 from procedures.analysis.thermal.converter import ZeroAndScale, zero_and_scale
 from procedures.analysis.thermal.normalised import fit_normalised
+from procedures.analysis.thermal.order import f_test
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterModel, Normalised
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -42,11 +44,13 @@ class ConverterSoaks:
 
 @dataclass(frozen=True)
 class Fitted:
-    """Normalised function of a channel, and the criterion that chose its order."""
+    """Normalised function of a channel, and the tests that chose its order."""
 
     value: Normalised
     bic: tuple[float, ...]
-    """Bayesian criterion of orders 1, 2, …; the chosen order has the least, unless the order was given."""
+    """Bayesian criterion of orders 1, 2, …, for comparison."""
+    p_values: tuple[float, ...]
+    """F tests of order 2 against 1, of 3 against 2: the chance of as much gain from noise alone."""
 
 
 @dataclass(frozen=True)
@@ -157,20 +161,31 @@ def _with_source(found: Normalised, sd: float) -> Normalised:
 LARGEST_ORDER = 3
 LEAST_FREE = 3
 """Degrees of freedom that a chosen order must leave: with fewer a small residual is often chance."""
+LEVEL = 0.01
+"""Significance level of the test that adds an order."""
 
 
 def _fitted(sensor_c: Array, values: Array, reference_c: float, order: int | None, relative: bool) -> Fitted:
-    orders = [q for q in range(1, LARGEST_ORDER + 1) if len(values) >= q + 1 + LEAST_FREE]
+    count = len(values)
+    orders = [q for q in range(1, LARGEST_ORDER + 1) if count >= q + 1 + LEAST_FREE]
     if not orders:
-        raise BadParameter("temperatures_c", len(values), f"at least {2 + LEAST_FREE} soaks")
-    fits = {q: fit_normalised(sensor_c, values, reference_c, q, relative) for q in orders}
-    bic = tuple(_criterion(fits[q].residual_sd, len(values), q) for q in orders)
-    chosen = orders[int(np.argmin(bic))] if order is None else order
-    value = fits.get(chosen) or fit_normalised(sensor_c, values, reference_c, chosen, relative)
-    return Fitted(value, bic)
+        raise BadParameter("temperatures_c", count, f"at least {2 + LEAST_FREE} soaks")
+    fits = [fit_normalised(sensor_c, values, reference_c, q, relative) for q in orders]
+    left = [_squares(fit.residual_sd, count, q) for fit, q in zip(fits, orders, strict=True)]
+    bic = tuple(_criterion(rss, count, q) for rss, q in zip(left, orders, strict=True))
+    p_values = tuple(f_test(left[q - 1], left[q], q + 1, q + 2, count) for q in orders[:-1])
+    chosen = max((q + 1 for q, p in zip(orders, p_values, strict=False) if p <= LEVEL), default=1)
+    if order is not None:
+        chosen = order
+    value = fits[chosen - 1] if chosen in orders else fit_normalised(sensor_c, values, reference_c, chosen, relative)
+    return Fitted(value, bic, p_values)
 
 
-def _criterion(residual_sd: float, count: int, order: int) -> float:
+def _squares(residual_sd: float, count: int, order: int) -> float:
+    """Sum of the squared residuals, of a fit without any 1e-300."""
+    return max(residual_sd**2 * (count - order - 1), 1e-300)
+
+
+def _criterion(rss: float, count: int, order: int) -> float:
     """Bayesian information criterion ``n·ln(rss/n) + k·ln n``."""
-    rss = residual_sd**2 * (count - order - 1)
-    return count * float(np.log(max(rss, 1e-300) / count)) + (order + 1) * float(np.log(count))
+    return count * float(np.log(rss / count)) + (order + 1) * float(np.log(count))

@@ -10,8 +10,10 @@ import numpy as np
 from bench_service.formats.bounds import MEGABYTE, quoted
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.logs.arrays_by_name.tables import (
+    FACT_BYTES,
     MOST_ARRAYS,
     NamedArray,
+    StatedFacts,
     StatedRates,
     lies,
     tables_by_length,
@@ -25,6 +27,8 @@ MAGIC = b"\x89HDF\r\n\x1a\n"
 LARGEST_CHUNK = 64 * MEGABYTE
 NARROW = 16
 """Columns of a dataset up to which a block is turned as a whole."""
+MOST_FACTS = 64
+"""Most attributes of a file, or of a data set, that are taken as facts."""
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS", "unit_string")
 _MATLAB_NUMBERS = (
     b"double",
@@ -73,6 +77,8 @@ class Hdf5:
         self._notes: list[str] = []
         self._arrays: dict[str, _Place] = {}
         self._rates = StatedRates()
+        self._stated = StatedFacts()
+        self.facts, self.column_facts = self._stated.facts, self._stated.column_facts
         h5py = needed("h5py", name)
         stream.seek(0)
         try:
@@ -91,15 +97,21 @@ class Hdf5:
 
         self._file.visititems(visit)
         self._rates.add_all("", self._file.attrs)
+        self.facts |= _texts(self._file.attrs)
 
     def _dataset(self, path: str, item: Any) -> None:
         matlab = item.attrs.get("MATLAB_class")
+        if matlab == b"char" and StatedFacts.is_fact(path.replace("/", ".")) and item.size <= FACT_BYTES:
+            self._stated.add(path.replace("/", "."), "".join(map(chr, np.asarray(item[()]).reshape(-1).tolist())))
+            return
         if matlab is not None and ("MATLAB_empty" in item.attrs or matlab not in _MATLAB_NUMBERS):
             if matlab in (b"table", b"timetable", b"datetime"):
                 self._note(_TABLES)
             return
         unit = next((_text(item.attrs[key]) for key in _UNITS if key in item.attrs), "")
         title = path.replace("/", ".") if matlab is not None else path
+        if matlab is None and (said := _texts(item.attrs)):
+            self.column_facts[path] = said
         if item.dtype.names:
             if len(item.shape) == 1:
                 for field in item.dtype.names:
@@ -110,6 +122,8 @@ class Hdf5:
             return
         if item.dtype.kind in "iuf" and item.size == 1:
             self._rates.add(path, item[()])
+            if matlab is not None and StatedFacts.is_fact(path.replace("/", ".")):
+                self._stated.add(path.replace("/", "."), repr(float(np.asarray(item[()]).reshape(-1)[0])))
         if item.dtype.kind not in "iufb" or len(item.shape) not in (1, 2):
             return
         shape = item.shape if len(item.shape) == 2 else (item.shape[0], 1)
@@ -188,6 +202,16 @@ def _by_descriptor(stream: BinaryIO) -> str | None:
     except (OSError, ValueError, AttributeError):
         return None
     return path if os.path.exists(os.path.realpath(path)) else None
+
+
+def _texts(attributes: Any) -> dict[str, str]:
+    """Attributes that are short texts. One that is damaged is left out."""
+    found: dict[str, str] = {}
+    for key in list(attributes)[:MOST_FACTS]:
+        value = attributes.get(key)
+        if isinstance(value, (str, bytes)) and len(value) <= FACT_BYTES:
+            found[str(key)] = _text(value)
+    return found
 
 
 def _text(value: Any) -> str:

@@ -17,8 +17,10 @@ from bench_service.formats.bounds import quoted
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.logs.arrays_by_name.mat5_source import Packed, Plain, Source
 from bench_service.formats.logs.arrays_by_name.tables import (
+    FACT_BYTES,
     MOST_ARRAYS,
     NamedArray,
+    StatedFacts,
     StatedRates,
     lies,
     tables_by_length,
@@ -30,7 +32,9 @@ NAME = "mat5"
 TITLE = "MATLAB .mat, version 5 to 7"
 _MATRIX, _COMPRESSED = 14, 15
 _CODES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-_STRUCT, _OPAQUE = 2, 17
+_STRUCT, _TEXT, _OPAQUE = 2, 4, 17
+_ENCODINGS = {1: "latin-1", 2: "latin-1", 4: "", 16: "utf-8", 17: ""}
+"""Encoding of text by the type of its element; empty: UTF-16 in the file's order."""
 _NUMERIC = range(6, 16)
 _CLASSES = {
     1: "a cell array",
@@ -77,6 +81,8 @@ class Mat5:
         self._arrays: dict[str, _Place] = {}
         self._notes: list[str] = []
         self._rates = StatedRates()
+        self._stated = StatedFacts()
+        self.facts, self.column_facts = self._stated.facts, self._stated.column_facts
         stream.seek(0)
         head = exactly(stream, 128, name, "the header of a MATLAB file")
         self._order = "<" if head[126:128] == b"IM" else ">"
@@ -140,6 +146,8 @@ class Mat5:
             self._struct(source, at, end, dims, title, depth)
         elif kind in _NUMERIC and not is_complex and len(dims) == 2:
             self._numbers(source, at, (dims[0], dims[1]), title)
+        elif kind == _TEXT and StatedFacts.is_fact(title):
+            self._text(source, at, dims, title)
         elif title and not title.startswith("__"):
             self._note(f"{quoted(title)} is {_CLASSES.get(kind, 'no real matrix of two dimensions')} and is not read")
 
@@ -162,6 +170,15 @@ class Mat5:
                 self._matrix(source, data, size, f"{title}.", depth + 1, field)
             at = after
 
+    def _text(self, source: Source, at: int, dims: Sequence[int], title: str) -> None:
+        """Take one line of text as a fact of the file."""
+        if len(dims) != 2 or dims[0] > 1:
+            return
+        kind, length, data, _ = self._tag(source, at)
+        if kind in _ENCODINGS and length <= FACT_BYTES:
+            encoding = _ENCODINGS[kind] or ("utf-16-le" if self._order == "<" else "utf-16-be")
+            self._stated.add(title, source.read(data, length).decode(encoding, "replace"))
+
     def _numbers(self, source: Source, at: int, dims: tuple[int, int], title: str) -> None:
         if dims[0] == 0 or dims[1] == 0:
             return
@@ -181,7 +198,10 @@ class Mat5:
         order = self._order if code[1] != "1" else "|"
         self._arrays[title] = _Place(NamedArray(title, rows, width), source, data, order + code, lying)
         if rows == width == 1:
-            self._rates.add(title, np.frombuffer(source.read(data, length), order + code)[0])
+            number = np.frombuffer(source.read(data, length), order + code)[0]
+            self._rates.add(title, number)
+            if StatedFacts.is_fact(title):
+                self._stated.add(title, repr(float(number)))
 
     def _note(self, words: str) -> None:
         if words not in self._notes and len(self._notes) < 20:

@@ -1,11 +1,17 @@
 """Bytes of a MATLAB variable, plain or packed: read at a place near the beginning, or walked from a place on."""
 
+import os
+import tempfile
+import weakref
 import zlib
-from typing import Any, BinaryIO, Protocol
+from contextlib import suppress
+from typing import IO, Any, BinaryIO, Protocol
 
 _PIECE = 256 * 1024
 WHOLE_BYTES = 16 * 1024 * 1024
 """Size of a variable that is unpacked at once."""
+SPOOLED_BYTES = 1024 * 1024 * 1024
+"""Size of a larger variable that is unpacked once into a temporary file, where there is room for it."""
 MOST_MARKS = 16
 _GLANCE = 4096
 """Number of bytes that are unpacked at once where only the head of a variable is asked for."""
@@ -68,6 +74,8 @@ class Packed:
         self._stream, self._begin, self._length = stream, begin, length
         self._reading = _PackedWalk(stream, begin, length)
         self._whole: bytes | None = None
+        self._spool: IO[bytes] | None = None
+        self._may_spool = True
         self._marks: list[_PackedWalk] = []
         self.unpacked_bytes = 8 + int.from_bytes(self._reading.glance(0, 8)[4:], "big" if big_endian else "little")
 
@@ -83,18 +91,53 @@ class Packed:
     def walk(self, at: int) -> Walk:
         """Return a walk from a place on. Raises `EOFError`, `zlib.error`.
 
-        A variable that is small unpacked is unpacked once; of a larger one each walk begins at the last mark before
-        its place, so that columns which are asked for in their order are skipped once and read once.
+        A variable is unpacked once, into memory where it is small, else into a temporary file. Where that has no room
+        for it each walk begins at the last mark before its place, so that columns which are asked for in their order
+        are skipped once and read once.
         """
         if self.unpacked_bytes <= WHOLE_BYTES:
             if self._whole is None:
                 self._whole = _PackedWalk(self._stream, self._begin, self._length).take(self.unpacked_bytes)
             return _WholeWalk(self._whole, at)
+        if self._may_spool and (spool := self._spooled()) is not None:
+            return _SpooledWalk(self, spool, at)
         nearest = max((m for m in self._marks if m.at <= at), key=lambda m: m.at, default=None)
         found = _PackedWalk(self._stream, self._begin, self._length) if nearest is None else nearest.twin()
         found.skip_to(at)
         self._marks = [*self._marks[-MOST_MARKS:], found.twin()]
         return found
+
+    def _spooled(self) -> IO[bytes] | None:
+        """Unpack the variable into a temporary file, once; None where it is too large, or the file cannot be written.
+        Raises `EOFError`, `zlib.error`.
+        """
+        if self._spool is None and self.unpacked_bytes <= SPOOLED_BYTES:
+            walk, left = _PackedWalk(self._stream, self._begin, self._length), self.unpacked_bytes
+            spool = tempfile.TemporaryFile()  # noqa: SIM115  closed with this reader
+            try:
+                while left:
+                    left -= spool.write(walk.take(min(left, 4 * _PIECE)))
+                spool.flush()
+                self._spool = spool
+                weakref.finalize(self, spool.close)
+            except OSError:
+                with suppress(OSError):
+                    spool.close()
+        self._may_spool = self._spool is not None
+        return self._spool
+
+
+class _SpooledWalk:
+    def __init__(self, owner: Packed, spool: IO[bytes], at: int) -> None:
+        self._owner = owner  # whose end closes the file
+        self._spool, self._at = spool, at
+
+    def take(self, size: int) -> bytes:
+        data = os.pread(self._spool.fileno(), size, self._at)
+        if len(data) < size:
+            raise EOFError("it ends too early")
+        self._at += size
+        return data
 
 
 class _WholeWalk:

@@ -74,6 +74,33 @@ class StatedRates:
         return (f"the file states a rate: {said}",) if said else ()
 
 
+FACT_BYTES = 4096
+"""Longest text that is taken as a fact."""
+
+
+class StatedFacts:
+    """Facts that a MATLAB file states in its structs `about` (of the file) and `channels` (of each variable)."""
+
+    def __init__(self) -> None:
+        self.facts: dict[str, str] = {}
+        self.column_facts: dict[str, dict[str, str]] = {}
+
+    @staticmethod
+    def is_fact(title: str) -> bool:
+        """Return whether a text or number of this name is a fact."""
+        return title.startswith(("about.", "channels."))
+
+    def add(self, title: str, text: str) -> None:
+        """Take a text, or a number as text, by its name about.FACT or channels.VARIABLE.FACT."""
+        struct, *path = title.split(".")
+        if len(self.facts) + len(self.column_facts) > MOST_ARRAYS:
+            return
+        if struct == "about" and len(path) == 1:
+            self.facts[path[0]] = text
+        elif struct == "channels" and len(path) == 2:
+            self.column_facts.setdefault(path[0], {})[path[1]] = text
+
+
 def lies(rows: int, width: int) -> bool:
     """Return whether a matrix holds its samples in columns: a few rows, and more columns than samples ever have."""
     return 1 < rows <= LYING_ROWS and width > WIDEST

@@ -6,6 +6,7 @@ end of the data, so that a file without its summary is read as far as it goes.
 
 import struct
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import BinaryIO
 
 from bench_service.formats.bounds import MEGABYTE, quoted
@@ -22,8 +23,10 @@ TITLE = "MCAP (ROS 2 or ROS 1)"
 MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
-_SCHEMA, _CHANNEL, _MESSAGE_OP, _CHUNK, _STATISTICS, _DATA_END = 3, 4, 5, 6, 11, 15
+_SCHEMA, _CHANNEL, _MESSAGE_OP, _CHUNK, _STATISTICS, _METADATA, _DATA_END = 3, 4, 5, 6, 11, 12, 15
 LARGEST_CHUNK = 128 * MEGABYTE
+MOST_FACTS = 1000
+"""Most pairs of one map of metadata that are taken."""
 _ENCODINGS = {"cdr": ("ros2msg", "ros2idl"), "ros1": ("ros1msg",)}
 
 
@@ -46,6 +49,9 @@ class Mcap:
         self._size = size_of(stream)
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._channels: dict[int, Topic] = {}
+        self.facts: dict[str, str] = {}
+        """Metadata of the file and of its channels, as far as they stand before the first message of each topic."""
+        self.column_facts: dict[str, dict[str, str]] = {}
         self._scan()
 
     def _scan(self) -> None:
@@ -143,6 +149,8 @@ class Mcap:
                 yield from self._one(memoryview(body), wanted)
             elif opcode in (_SCHEMA, _CHANNEL):
                 self._define(opcode, body)
+            elif opcode == _METADATA:
+                self._state(body)
 
     def _chunk(self, body: bytes) -> memoryview:
         try:
@@ -195,10 +203,17 @@ class Mcap:
             elif opcode == _CHANNEL and number not in self._channels:
                 schema = int.from_bytes(body[2:4], "little")
                 topic, at = _text(body, 4)
-                encoding, _ = _text(body, at)
+                encoding, at = _text(body, at)
                 self._channels[number] = self._topic(topic, encoding, schema)
+                self.facts = _pairs(body, at) | self.facts
         except (struct.error, IndexError) as error:
             raise UnreadableFile(self._name, "has a schema or a channel that is damaged") from error
+
+    def _state(self, body: bytes) -> None:
+        """Take a record of metadata; one that is damaged says nothing."""
+        with suppress(struct.error):
+            _, at = _text(body, 0)
+            self.facts |= _pairs(body, at)
 
     def _topic(self, topic: str, encoding: str, schema: int) -> Topic:
         title, kind, text = self._schemas.get(schema, ("", "", ""))
@@ -230,3 +245,17 @@ class Mcap:
 def _text(body: bytes, at: int) -> tuple[str, int]:
     length = struct.unpack_from("<I", body, at)[0]
     return body[at + 4 : at + 4 + length].decode("utf-8", "replace"), at + 4 + length
+
+
+def _pairs(body: bytes, at: int) -> dict[str, str]:
+    """A map of texts from a place on; what is too long for its record is left out."""
+    if at + 4 > len(body):
+        return {}
+    end = min(len(body), at + 4 + struct.unpack_from("<I", body, at)[0])
+    at, found = at + 4, dict[str, str]()
+    while at + 8 <= end and len(found) < MOST_FACTS:
+        key, at = _text(body, at)
+        if at + 4 > end:
+            break
+        found[key], at = _text(body, at)
+    return found

@@ -1,7 +1,7 @@
 """Gyros in a thermal cycle: tests of their rate against temperature and of their noise at rest (thesis 4.2.3)."""
 
 from collections.abc import Sequence
-from math import log, sqrt
+from math import isfinite, log, sqrt
 
 import numpy as np
 from scipy.special import chdtrc
@@ -93,9 +93,13 @@ def _noise(run: str, axis: str, fit: NoiseFit, known: tuple[float, float, float]
         n.value,
         b.value,
         (q.standard_uncertainty, n.standard_uncertainty, b.standard_uncertainty),
-        (q.upper_limit, n.upper_limit, b.upper_limit),
+        (_finite(q.upper_limit), _finite(n.upper_limit), _finite(b.upper_limit)),
         known,
     )
+
+
+def _finite(limit: float) -> float | None:
+    return limit if isfinite(limit) else None
 
 
 def _three(noise: NoiseCoefficients) -> tuple[float, float, float]:

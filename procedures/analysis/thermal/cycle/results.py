@@ -154,7 +154,9 @@ class GyroTemperature:
 
 @dataclass(frozen=True)
 class GyroNoise:
-    """Noise of one gyro in one run (thesis table 4.7), with the unit's known noise to compare. None: not observed."""
+    """Noise of one gyro in one run (thesis table 4.7), with the unit's known noise to compare. None as a coefficient:
+    not observed.
+    """
 
     run: str
     axis: str
@@ -162,7 +164,8 @@ class GyroNoise:
     random_walk: float | None
     bias_instability: float | None
     uncertainties: tuple[float | None, float | None, float | None]
-    upper_limits: Triple
+    upper_limits: tuple[float | None, float | None, float | None]
+    """Upper limits of Q, N and B (95 %, one-sided), observed or not; None: unbounded."""
     known: Triple | None
 
 
