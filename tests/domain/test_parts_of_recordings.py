@@ -1,34 +1,43 @@
 """Some channels of a recording, a stretch of it, and both of a recording whose outliers were mended."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection, Watched
 from procedures.analysis.parts import cut, of_channels
 from procedures.core.errors import MissingChannel
-from procedures.core.recording import Channel, MemoryRecording, Quantity, RawArray, Recording, RecordingInfo
+from procedures.core.recording import Channel, Quantity, RawArray, Recording, RecordingInfo
 
 CHANNELS = tuple(Channel(f"gyro_{axis}", Quantity.ANGULAR_RATE, "rad/s", 1e-7) for axis in "xyz")
 
 
-class Blocks(MemoryRecording):
+@dataclass(frozen=True)
+class Blocks:
     """A recording whose blocks are short."""
 
-    def blocks(self):
+    info: RecordingInfo
+    raw: NDArray[np.int32]
+
+    def blocks(self) -> Iterator[RawArray]:
+        """Yield the samples in seven blocks."""
         yield from np.array_split(self.raw, 7)
 
 
-def _recording(raw: RawArray) -> Recording:
+def _recording(raw: NDArray[np.int32]) -> Recording:
     return Blocks(RecordingInfo("r", "U", CHANNELS, 100.0, len(raw)), raw)
 
 
-def _raw() -> RawArray:
+def _raw() -> NDArray[np.int32]:
     return np.random.Generator(np.random.PCG64(3)).normal(0.0, 40.0, (30_000, 3)).round().astype(np.int32)
 
 
-def _whole(recording: Recording) -> RawArray:
-    return np.concatenate(list(recording.blocks()))
+def _whole(recording: Recording) -> NDArray[np.int32]:
+    return np.concatenate([block.astype(np.int32) for block in recording.blocks()])
 
 
 def test_channels_come_in_the_order_asked_for_and_a_missing_one_is_named() -> None:
