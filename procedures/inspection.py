@@ -10,9 +10,10 @@ from dataclasses import replace
 from procedures.analysis.fitness.findings import Kind
 from procedures.analysis.fitness.watched import Inspection, Watch
 from procedures.analysis.measured_stations import at_measured_angles
+from procedures.analysis.parts import cut
 from procedures.core.errors import BadParameter, DomainError, MissingChannel, ProcedureDefect
 from procedures.core.limits import BOUND_RULE, Check, OutcomeName, Verdict, decided, verdict
-from procedures.core.recording import Recording, cut
+from procedures.core.recording import Recording
 from procedures.core.unit import Unit
 from procedures.parameters import DecisionRules
 from procedures.procedure import (

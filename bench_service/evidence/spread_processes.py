@@ -1,23 +1,23 @@
-"""Processes that share the analysis of a long recording: both processors work, and the service's memory stays small.
+"""Two processes that share the analysis of a long recording: both processors work, and the service's memory stays
+small.
 
-They are begun when a job that will need them begins, so that nobody waits for their imports, and they end when they
-have had nothing to do for a while. Where one of them dies, its parts are worked out in the caller's thread.
+The second is forked from the first when that has imported what both need; see `two_processes`. They begin when a job
+that will need them begins, so that nobody waits for their imports, and they end when they have had nothing to do for a
+while. Where one of them dies, its parts are worked out in the other, or in the caller's thread.
 """
 
 import logging
 import multiprocessing
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, ExitStack
-from importlib import import_module
 from threading import Lock, Timer
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from bench_service.evidence.work_processes import Refusal, begin_process
-from bench_service.model.errors import ServiceError
+from bench_service.evidence.two_processes import begin_both, both_numbers, shared_parts
+from bench_service.evidence.work_processes import Refusal
 from procedures.bench.imu import Imu
-from procedures.core.errors import DomainError
 from procedures.core.recording import Recording, Station
 from procedures.core.spread import Spread, spread_over
 
@@ -27,18 +27,11 @@ R = TypeVar("R")
 log = logging.getLogger(__name__)
 
 AT_ONCE = 2
-"""Number of processes."""
+"""Number of processes, and so of parts at one time."""
 MANY_VALUES = 5_000_000
 """Number of samples of all channels from which an analysis takes longer than handing its parts over."""
 IDLE_S = 10.0
 """Time without work after which the processes end [s, real time]."""
-MODULES = (
-    "procedures.launches",
-    "procedures.analysis.thermal.cycle.series",
-    "scipy.fft",
-    "bench_service.persistence.evidence.recording_store",
-)
-"""Modules that a process imports beforehand: it has the time while a job records."""
 
 
 class SpreadProcesses:
@@ -52,6 +45,7 @@ class SpreadProcesses:
         self._idle_s = idle_s
         self._mutex = Lock()
         self._pool: ProcessPoolExecutor | None = None
+        self._numbers: Future[list[int]] | None = None
         self._users = 0
         self._timer: Timer | None = None
         self._expected = False
@@ -77,10 +71,7 @@ class SpreadProcesses:
         """Begin the processes for an analysis of so many values; it does not wait for them, they wait until `done`."""
         if self.over(values) is not None and not self._expected:
             self._expected = True
-            pool = self._taken()
-            if pool is not None:
-                for _ in range(AT_ONCE):
-                    pool.submit(_nothing)
+            self._taken()
 
     def done(self) -> None:
         """Let the processes end when they are idle: the analysis that was expected is done, or will not come."""
@@ -96,23 +87,28 @@ class SpreadProcesses:
         try:
             if pool is None:
                 return [work(item) for item in items]
-            waiting: list[Future[Any]] = [pool.submit(_part, work, item) for item in items]
-            found = [part.result() for part in waiting]
+            found = pool.submit(shared_parts, work, items).result()
         except BrokenProcessPool:
             log.warning("a process that analysed a recording ended before it was done: the service does it itself")
             self._forget(pool)
             return [work(item) for item in items]
         finally:
             self._given_back()
+        results: list[R] = []
         for part in found:
             if isinstance(part, Refusal):
                 raise part.error()
-        return found
+            results.append(part)
+        return results
 
     def processes(self) -> list[int]:
-        """Return the process ids of the processes that run now."""
+        """Return the process ids of the processes that run now, once they have begun."""
         with self._mutex:
-            return [] if self._pool is None else list(getattr(self._pool, "_processes", {}))
+            numbers = self._numbers
+        try:
+            return [] if numbers is None else numbers.result()
+        except (BrokenProcessPool, CancelledError):
+            return []
 
     def close(self) -> None:
         """End the processes for good; parts that are under way are cut off."""
@@ -127,7 +123,8 @@ class SpreadProcesses:
                 self._timer = None
             if self._pool is None and not self._closed:
                 context = multiprocessing.get_context("spawn")
-                self._pool = ProcessPoolExecutor(AT_ONCE, context, _begin)
+                self._pool = ProcessPoolExecutor(1, context, begin_both)
+                self._numbers = self._pool.submit(both_numbers)
             return self._pool
 
     def _given_back(self) -> None:
@@ -141,7 +138,7 @@ class SpreadProcesses:
     def _forget(self, pool: ProcessPoolExecutor | None) -> None:
         with self._mutex:
             if self._pool is pool:
-                self._pool = None
+                self._pool = self._numbers = None
 
     def _end_if_idle(self) -> None:
         with self._mutex:
@@ -151,7 +148,7 @@ class SpreadProcesses:
 
     def _end(self) -> None:
         with self._mutex:
-            pool, self._pool = self._pool, None
+            pool, self._pool, self._numbers = self._pool, None, None
             if self._timer is not None:
                 self._timer.cancel()
         if pool is not None:
@@ -165,24 +162,3 @@ def spread_processes(closing: ExitStack) -> SpreadProcesses:
     processes = SpreadProcesses()
     closing.callback(processes.close)
     return processes
-
-
-def _begin() -> None:
-    """Set up a new process."""
-    from threadpoolctl import threadpool_limits
-
-    begin_process()
-    for name in MODULES:
-        import_module(name)
-    threadpool_limits(1)
-
-
-def _nothing() -> None:
-    """No part of anything: a process begins for it."""
-
-
-def _part(work: Callable[[A], R], item: A) -> R | Refusal:
-    try:
-        return work(item)
-    except (DomainError, ServiceError, ArithmeticError, ValueError) as refused:
-        return Refusal.of(refused)

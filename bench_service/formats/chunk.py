@@ -63,7 +63,7 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
             "rate_hz": repr(float(place.rate_hz)),
         },
     )
-    columns = [arrow_array(samples[:, index]) for index in range(len(names))]
+    columns = [arrow_array(row) for row in np.ascontiguousarray(samples.T[: len(names)])]
     sink = pa.BufferOutputStream()
     pq.write_table(
         pa.Table.from_arrays(columns, schema=schema),
@@ -77,7 +77,10 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
 
 
 def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
-    """Return the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
+    """Return the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`.
+
+    Each channel lies in one piece of memory, as in the chunk and as analyses take it.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -86,10 +89,10 @@ def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
         columns = [_numbers(table.column(name)) for name in names]
     except (pa.ArrowException, OSError, KeyError) as error:
         raise UnreadableChunk(str(error)) from error
-    out = np.empty((table.num_rows, len(names)), dtype=columns[0].dtype)
-    for index, column in enumerate(columns):
-        out[:, index] = column
-    return out
+    out = np.empty((len(names), table.num_rows), dtype=columns[0].dtype)
+    for row, column in zip(out, columns, strict=True):
+        row[:] = column
+    return out.T
 
 
 def arrow_array(values: NDArray[Any]) -> Any:

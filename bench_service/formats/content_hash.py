@@ -29,7 +29,7 @@ class ContentHash:
 
     def update(self, samples: RawArray) -> None:
         """Add samples, shape (n, channels), of the type that was announced."""
-        self._sha.update(np.ascontiguousarray(samples, dtype=self._dtype).tobytes())
+        self._sha.update(np.ascontiguousarray(samples, dtype=self._dtype).data)
 
     def copy(self) -> "ContentHash":
         """Return an independent continuation of the hash."""

@@ -35,7 +35,8 @@ def channel_rows(info: RecordingInfo, names: Sequence[str], blocks: Iterator[Raw
     """
     columns, scale = [info.column(name) for name in names], info.nominal_scale(names)
     for block in blocks:
-        rows = np.ascontiguousarray(block.T[columns], dtype=np.float64)
+        whole = columns == list(range(block.shape[1]))  # no copy but the one to floats
+        rows = np.array(block.T if whole else block.T[columns], dtype=np.float64, order="C")
         scale.convert_rows(rows)
         yield rows
 

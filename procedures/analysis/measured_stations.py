@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from procedures.analysis.parts import of_channels
 from procedures.core.recording import RawArray, Recording, RecordingInfo
 from procedures.core.table_angles import TableAngles
 
@@ -13,6 +14,10 @@ class _At:
 
     info: RecordingInfo
     whole: Recording
+
+    def only(self, names: Sequence[str]) -> Recording:
+        """Return some of the channels, in that order. Raises `MissingChannel`."""
+        return _At(self.info.only(names), of_channels(self.whole, names))
 
     def blocks(self) -> Iterator[RawArray]:
         return self.whole.blocks()

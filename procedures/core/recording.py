@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from procedures.core.arrays import Array
-from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
+from procedures.core.errors import MissingChannel, UnfitRecording
 from procedures.core.measured import Measured
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.stop_rule import StopRule
@@ -199,6 +199,10 @@ class RecordingInfo:
                 return index
         raise MissingChannel(name, tuple(c.name for c in self.channels))
 
+    def only(self, names: Sequence[str]) -> "RecordingInfo":
+        """Return the description with some of the channels, in that order. Raises `MissingChannel`."""
+        return replace(self, channels=tuple(self.channels[self.column(name)] for name in names))
+
     def nominal_scale(self, names: Sequence[str]) -> NominalScale:
         """Return the conversion of raw samples of some channels to nominal rates. Raises `MissingChannel`."""
         return NominalScale.of([self.channels[self.column(name)] for name in names], self.rate_hz)
@@ -228,26 +232,6 @@ class MemoryRecording:
         yield self.raw
 
 
-@dataclass(frozen=True)
-class Stretch:
-    """Recording of the samples `start` … `stop` (half open) of another recording."""
-
-    info: RecordingInfo
-    whole: Recording
-    start: int
-    stop: int
-
-    def blocks(self) -> Iterator[RawArray]:
-        seen = 0
-        for block in self.whole.blocks():
-            part = block[max(self.start - seen, 0) : max(self.stop - seen, 0)]
-            seen += len(block)
-            if len(part):
-                yield part
-            if seen >= self.stop:
-                return
-
-
 def titles(recordings: Sequence[Recording]) -> list[str]:
     """Return the titles of several recordings, in their order; equal ones carry the beginning of the id as well."""
     plain = [recording.info.title for recording in recordings]
@@ -255,27 +239,6 @@ def titles(recordings: Sequence[Recording]) -> list[str]:
         f"{title} ({recording.info.id[:8]})" if plain.count(title) > 1 and recording.info.id != title else title
         for title, recording in zip(plain, recordings, strict=True)
     ]
-
-
-def cut(recording: Recording, start_s: float | None, stop_s: float | None) -> Recording:
-    """Return the recording from one second of it to another; None: from its beginning, to its end. Its id and hash
-    stay.
-
-    Raises `BadParameter` where nothing lies between them, or where the recording is shorter.
-    """
-    info = recording.info
-    if start_s is None and stop_s is None:
-        return recording
-    allowed = f"within 0 … {info.duration_s:g} s, the length of recording {info.id}"
-    for name, value in (("start_s", start_s), ("stop_s", stop_s)):
-        if value is not None and not 0.0 <= value <= info.duration_s * (1.0 + 1e-9):
-            raise BadParameter(name, value, allowed)
-    start = round((start_s or 0.0) * info.rate_hz)
-    stop = info.count if stop_s is None else min(round(stop_s * info.rate_hz), info.count)
-    if stop <= start:
-        raise BadParameter("stop_s", stop_s, f"later than start_s, {start_s or 0.0:g} s, {allowed}")
-    told = replace(info, count=stop - start, start_s=info.start_s + start / info.rate_hz)
-    return Stretch(told, recording, start, stop)
 
 
 def rates(recording: Recording, names: Sequence[str]) -> Array:

@@ -13,8 +13,9 @@ from procedures import catalog, methods
 from procedures.analysis.fitness.findings import ChannelFitness, Finding, FitnessSettings, Kind, Severity
 from procedures.analysis.fitness.grouped import grouped
 from procedures.analysis.fitness.watched import Inspection, Watch
+from procedures.analysis.parts import cut
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.recording import GYRO, Channel, MemoryRecording, Quantity, RawArray, RecordingInfo, Station, cut
+from procedures.core.recording import GYRO, Channel, MemoryRecording, Quantity, RawArray, RecordingInfo, Station
 from procedures.core.turn import Turn
 from procedures.inspection import analyse_method
 from procedures.methods import allan_deviation

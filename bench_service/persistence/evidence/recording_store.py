@@ -51,6 +51,10 @@ class StoredSamples:
         """Yield the raw samples in order, a chunk at a time."""
         return self.since(0)
 
+    def only(self, names: Sequence[str]) -> "StoredSamples":
+        """Return some of the channels, in that order; the others are not decoded. Raises `MissingChannel`."""
+        return StoredSamples(self.info.only(names), self._reader)
+
     def since(self, start: int) -> Iterator[RawArray]:
         """Yield the raw samples from sample `start` on, in order, a chunk at a time."""
         return self._reader.blocks([c.name for c in self.info.channels], start, self.info.count)

@@ -4,17 +4,15 @@ The first pass over a recording's blocks also serves the inspection; a refusal a
 result. A few outliers can be mended for a second analysis.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-import numpy as np
-
 from procedures.analysis.fitness.findings import ChannelFitness, FitnessSettings, Kind, Severity
 from procedures.analysis.fitness.grouped import grouped
-from procedures.analysis.fitness.jumps import Jump
-from procedures.analysis.fitness.misreadings import Misread
+from procedures.analysis.fitness.mended import Mended, Outliers
 from procedures.analysis.fitness.stream import FitnessStream
+from procedures.analysis.parts import Picked, of_channels
 from procedures.core import spread
 from procedures.core.errors import UnfitRecording
 from procedures.core.recording import Channel, Quantity, RawArray, Recording, RecordingInfo, Station
@@ -85,7 +83,7 @@ class Watched:
     def blocks(self) -> Iterator[RawArray]:
         """Yield the blocks; the end of the first pass raises `UnfitRecording` where the recording is refused."""
         if self._fitness is not None:
-            yield from self._again()
+            yield from self._later().blocks()
             return
         stream = self._stream()
         for block in self._recording.blocks():
@@ -93,6 +91,13 @@ class Watched:
             yield block
         self._end(stream)
         self.require_fit()
+
+    def only(self, names: Sequence[str]) -> Recording:
+        """Return some of the channels, in that order, for a later pass. Raises `MissingChannel`.
+
+        Before the first pass, which is the inspection, all are read.
+        """
+        return of_channels(self._later(), names) if self._fitness is not None else Picked.of(self, names)
 
     @property
     def unwatched(self) -> Recording:
@@ -140,6 +145,10 @@ class Watched:
         """
         self._mended = True
 
+    def _later(self) -> Recording:
+        """The recording as passes after the first see it."""
+        return Mended(self._recording, self._outliers) if self._mended else self._recording
+
     def _stream(self) -> FitnessStream:
         info = self.info
         settings = self._inspection.of_station(info.station)
@@ -152,36 +161,7 @@ class Watched:
         if self._inspection.settings.mends_outliers:
             self._outliers = {**stream.outliers(), **stream.misread()}
 
-    def _again(self) -> Iterator[RawArray]:
-        start = 0
-        for block in self._recording.blocks():
-            yield self._without_outliers(block, start) if self._mended else block
-            start += len(block)
 
-    def _without_outliers(self, block: RawArray, start: int) -> RawArray:
-        stop = start + len(block)
-        inside = [
-            (c, one)
-            for c, found in self._outliers.items()
-            for one in found
-            if (start <= one.index < stop if isinstance(one, Jump) else one.start < stop and start < one.stop)
-        ]
-        if not inside:
-            return block
-        mended = block.copy()
-        whole = np.issubdtype(mended.dtype, np.integer)
-        for column, one in inside:
-            if isinstance(one, Jump):
-                mended[one.index - start, column] -= round(one.size) if whole else one.size
-                continue
-            rows = np.arange(max(one.start, start), min(one.stop, stop))
-            line = one.straight(rows.astype(np.float64))
-            mended[rows - start, column] = np.rint(line) if whole else line
-        return mended
-
-
-Outliers = Mapping[int, Sequence[Jump | Misread]]
-"""Outliers and misread temperatures, by column."""
 Seen = tuple[tuple[ChannelFitness, ...], Outliers]
 """Findings and outliers of a recording's first pass."""
 

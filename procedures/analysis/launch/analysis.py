@@ -22,6 +22,7 @@ from procedures.analysis.launch.results import ChannelNoise, LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal, clean_signal
 from procedures.analysis.noise_fit.powers import FastPowers, Powers
+from procedures.analysis.parts import of_channels
 from procedures.core import spread
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -254,7 +255,8 @@ def _passed(
         )
         for signal in signals
     ]
-    for rows in channel_rows(info, names, recording.blocks()):
+    some = of_channels(recording, names)
+    for rows in channel_rows(some.info, names, some.blocks()):
         for stream, row in zip(streams, rows, strict=True):
             stream.add(row)
     return streams

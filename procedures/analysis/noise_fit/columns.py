@@ -12,6 +12,7 @@ random walk) R is a generalised covariance, good up to a constant, which modes o
 So γ(0) − γ(1) is the Allan variance at Δ: 3Q²/Δ², N²/Δ, (2 ln 2/π)B² (whole band), K²Δ/3 (IEEE Std 952 Annex C).
 """
 
+from functools import lru_cache
 from math import isinf, log, pi
 
 import numpy as np
@@ -76,6 +77,32 @@ def _second_difference_of_square_log(lag: Array) -> Array:
     direct = square_log(near + 1.0) - 2.0 * square_log(near) + square_log(near - 1.0)
     expanded = 2.0 * np.log(far) + 3.0 - 1.0 / (6.0 * far**2) - 1.0 / (30.0 * far**4)
     return np.concatenate([direct, expanded])
+
+
+@lru_cache(maxsize=2)
+def of_cells(count: int, cell_s: float, band_s: FlickerBand) -> Array:
+    """Return the expected power of unit Q², N², B², K² in the modes of a record's cell means, (4, count − 1).
+
+    The channels of a launch share it: it is read only. Raises `BadParameter`.
+    """
+    # one process at a time: transforms of all four would be the largest thing in memory
+    expected = np.stack([cosine_powers(gamma) for gamma in covariances(count, cell_s, band_s)])
+    expected[QUANTIZATION] = free_ended_quantization(count, cell_s)
+    expected.setflags(write=False)
+    return expected
+
+
+@lru_cache(maxsize=2)
+def of_segments(length: int, edge: int, rate_hz: float, band_s: FlickerBand) -> Array:
+    """Return the expected power of unit Q², N², B², K² in the modes of tapered segments, (4, length/2 + 1).
+
+    `edge`: samples over which the taper rises; its squares sum to 1. Read only. Raises `BadParameter`.
+    """
+    taper = sine_edged_taper(length, edge)
+    taper /= np.sqrt(np.sum(taper**2))
+    expected = tapered_powers(covariances(length, 1.0 / rate_hz, band_s), taper)
+    expected.setflags(write=False)
+    return expected
 
 
 def cosine_powers(gamma: Array) -> Array:

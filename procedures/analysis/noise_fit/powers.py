@@ -39,7 +39,7 @@ _CUT, _ROUNDS = 1e-5, 6
 VARIANCES = range(4)
 _EDGE = 8
 """The taper rises over this fraction, 1/8, of a segment."""
-_TOGETHER = 4
+_TOGETHER = 2
 """Segments that are transformed at once."""
 
 
@@ -80,9 +80,7 @@ def slow_powers(
         raise UnfitRecording(f"{n} cell means are too few for noise coefficients; the least is {FEWEST_SAMPLES}")
     if np.all(y == y[0]):
         raise UnfitRecording(f"the channel is constant ({y[0]!r}): a stuck channel has no noise to analyse")
-    # one process at a time: transforms of all four would be the largest thing in memory
-    expected = np.stack([columns.cosine_powers(gamma) for gamma in columns.covariances(n, cell_s, flicker_band_s)])
-    expected[columns.QUANTIZATION] = columns.free_ended_quantization(n, cell_s)
+    expected = columns.of_cells(n, cell_s, flicker_band_s)
     ends = np.zeros((2, n))
     ends[0, 0] = ends[1, -1] = 1.0
     time = (np.arange(n) - 0.5 * (n - 1)) * cell_s
@@ -170,7 +168,6 @@ class FastPowers:
         # from one to the next: fresh memory would cost more time than the transform.
         self._tapered = np.empty((_TOGETHER, self._length))
         self._waiting = 0
-        self._modes = np.empty((_TOGETHER, len(self._sum)), dtype=np.complex128)
         self.segments = 0
         """Segments taken so far; `finish` needs one."""
 
@@ -200,8 +197,7 @@ class FastPowers:
         self._segment[: self._edge] = self._segment[-self._edge :].copy()
 
     def _transform(self) -> None:
-        modes = self._modes[: self._waiting]
-        np.fft.rfft(self._tapered[: self._waiting], out=modes)
+        modes = np.asarray(fft.rfft(self._tapered[: self._waiting]))
         parts = modes.view(np.float64)
         squares = np.square(parts, out=parts).sum(axis=0)
         self._sum += squares[0::2] + squares[1::2]
@@ -225,9 +221,7 @@ class FastPowers:
         kept = ~is_line & (mode * self._rate_hz / length >= self._crossover_hz)
         if not np.any(kept):
             raise UnfitRecording("the full-rate spectrum consists of lines alone")
-        expected = columns.tapered_powers(columns.covariances(length, 1.0 / self._rate_hz, self._band_s), self._taper)[
-            :, :-1
-        ]
+        expected = columns.of_segments(length, self._edge, self._rate_hz, self._band_s)[:, :-1]
         bins = _Bins.over(mode[kept], 0, BINS)
         zeros = np.zeros((len(bins.count), 3, 3))
         return Powers(

@@ -10,6 +10,7 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from procedures.analysis.noise_fit.lines import SpectralLine, levels_around, standing_out
 from procedures.core.arrays import Array
@@ -93,15 +94,29 @@ def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
     first = int(np.argmax(ratio))
     if ratio[first] <= 1.0:
         return None
-    from scipy.signal import zoom_fft  # with all of scipy's statistics: few records have such a line
-
-    span = np.array([first - 1.0, first + 1.0]) / len(y)
-    fine = np.abs(zoom_fft(y * taper, span * 2.0, _FINE, fs=2.0, endpoint=True))
+    fine = np.abs(_zoomed(y * taper, first - 1.0, 2.0 / (_FINE - 1), _FINE))
     at = int(np.clip(np.argmax(fine), 1, _FINE - 2))
     left, top, right = np.log(fine[at - 1 : at + 2])
     bend = left - 2.0 * top + right
     moved = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
     return float(first - 1.0 + 2.0 * (at + np.clip(moved, -1.0, 1.0)) / (_FINE - 1))
+
+
+def _zoomed(y: Array, begin: float, step: float, count: int) -> NDArray[np.complex128]:
+    """Transform of a record (n,) at `begin`, begin + step… cycles in the record, (count,): Bluestein's algorithm.
+
+    With ``jk = (j² + k² − (j−k)²)/2`` it is a convolution by a chirp. `scipy.signal.zoom_fft` is the same, and imports
+    all of scipy's statistics: longer than the analysis of a channel.
+    """
+    n, most = len(y), max(len(y), count)
+    chirp = np.exp(-1j * pi * step / n * np.arange(most, dtype=np.float64) ** 2)
+    length = fft.next_fast_len(n + count - 1)
+    around = np.zeros(length, dtype=np.complex128)
+    around[:count] = 1.0 / chirp[:count]
+    around[length - n + 1 :] = 1.0 / chirp[n - 1 : 0 : -1]
+    turned = y * np.exp(-2j * pi * begin / n * np.arange(n)) * chirp[:n]
+    product = np.asarray(fft.fft(turned, length)) * np.asarray(fft.fft(around))
+    return np.asarray(fft.ifft(product))[:count] * chirp[:count]
 
 
 def _fitted(cells: Array, cycles: list[float]) -> tuple[Array, Array]:
