@@ -44,6 +44,7 @@ from bench_service.settings import Settings
 from bench_service.telemetry.audit_retention import begin_retention
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
+from procedures.importing import IMPORTING
 
 IMPORT_THREADS = 4
 """Maximum number of imports that are stored or wait for a reader at one time; more wait without a thread."""
@@ -191,7 +192,7 @@ def create_app(
 
 def _add_nouns(app: FastAPI, service: BenchService) -> None:
     """Add all other routes; they are imported here because that takes as long as all of the start before."""
-    with no_collection():
+    with IMPORTING, no_collection():
         from bench_service.nouns import add_nouns
 
         add_nouns(app, service)

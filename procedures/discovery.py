@@ -6,6 +6,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Generic, TypeVar
 
+from procedures.importing import IMPORTING
+
 E = TypeVar("E")
 
 
@@ -39,7 +41,8 @@ def discovered(
             continue
         place = f"{package}.{module.name}"
         try:
-            entry = getattr(import_module(place), attribute, None)
+            with IMPORTING:
+                entry = getattr(import_module(place), attribute, None)
             if not isinstance(entry, kind):
                 raise TypeError(f"{place}: there is no {attribute}, which must be a {kind.__name__}")
             name = getattr(entry, "name", None)

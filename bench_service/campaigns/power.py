@@ -7,6 +7,7 @@ from math import sqrt
 
 from bench_service.campaigns.campaign import DecisionRule
 from procedures.core.limits import Limit, PlannedCheck, bounds
+from procedures.importing import IMPORTING
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,8 @@ def beyond(planned: PlannedCheck, true: float, limit: float) -> float:
     An estimate: ``Φ((true − limit)/u)``.
     A root mean square of ν degrees of freedom: ``P(χ²_ν > ν·limit²/(true² + u²))``.
     """
-    from scipy.special import gammaincc, ndtr  # a start does without it
+    with IMPORTING:
+        from scipy.special import gammaincc, ndtr  # a start does without it
 
     u = planned.standard_uncertainty or 0.0
     if limit <= 0.0:
@@ -100,7 +102,8 @@ def smallest_step(planned: PlannedCheck, power: float, of: int) -> float:
     The scatter s² of n values, of which one lies δ away from the rest, is noncentral: ``(n − 1)·s²/σ²`` has the
     noncentrality ``δ²(n − 1)/(n·σ²)``, σ² = expected² + u². The step is found by bisection, in the limit's unit.
     """
-    from scipy.special import chndtr
+    with IMPORTING:
+        from scipy.special import chndtr
 
     sigma2 = (planned.expected or 0.0) ** 2 + (planned.standard_uncertainty or 0.0) ** 2
     freedom, limit = of - 1.0, planned.limit.maximum or 0.0

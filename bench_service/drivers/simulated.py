@@ -20,6 +20,7 @@ from procedures.bench.errors import BenchError
 from procedures.core.arrays import Array
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.unit import Unit
+from procedures.importing import IMPORTING
 from simulators.truth import (
     BenchTruth,
     UnitTruth,
@@ -109,7 +110,8 @@ class SimulatedDriver:
         `seed` None: 0. `checkpoint` None: the beginning. `job`: id of the job that takes the link, None outside of
         jobs.
         """
-        from simulators.world import build  # with MuJoCo: not needed before a bench is opened
+        with IMPORTING:
+            from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
         self.warm_up()  # a job that came before the service's own warm-up would do it during its first demand
         config = replace(
@@ -132,7 +134,8 @@ class SimulatedDriver:
 
     def warm_up(self) -> None:
         """Load the filter of the unit's noise: half a second, of which the watchdog would see a table that hangs."""
-        import_module("scipy.signal")
+        with IMPORTING:
+            import_module("scipy.signal")
 
     def world(
         self, unit: str, seed: int, needs: BenchNeeds, description: BenchDescription, clock: Clock
@@ -141,7 +144,8 @@ class SimulatedDriver:
 
         `description`: the limits of the mixed bench, to which its simulated devices hold.
         """
-        from simulators.world import WorldConfig, build
+        with IMPORTING:
+            from simulators.world import WorldConfig, build
 
         self.warm_up()
         known = unit == self._unit.serial or _drawn_truth(unit) is not None

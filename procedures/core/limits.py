@@ -12,6 +12,8 @@ from enum import StrEnum
 from math import inf, isfinite
 from typing import Literal
 
+from procedures.importing import IMPORTING
+
 RuleName = Literal["simple", "guarded"]
 OutcomeName = Literal["pass", "conditional pass", "conditional fail", "fail", "inconclusive"]
 OURS, SIGNIFICANCE, ASKED = "ours", "ours: a test of significance", "the request"
@@ -70,7 +72,8 @@ class Decision:
 
 def coverage_factor(probability: float, degrees_of_freedom: float | None) -> float:
     """Return Student's factor k of a two-sided interval (JCGM 100, G.3); None: infinitely many, the normal one."""
-    from scipy.special import ndtri, stdtrit  # a start does without it
+    with IMPORTING:
+        from scipy.special import ndtri, stdtrit  # a start does without it
 
     tail = 0.5 * (1.0 + probability)
     if degrees_of_freedom is None or not isfinite(degrees_of_freedom):

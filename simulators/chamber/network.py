@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.importing import IMPORTING
 from simulators.truth import Array
 from simulators.truth.thermal import NODES, ChamberTruth, NetworkTruth
 
@@ -72,7 +73,8 @@ class Step:
     @classmethod
     def of(cls, a: Array, b: Array, step_s: float) -> "Step":
         """Discretise by Van Loan: ``exp([[A, B, 0], [0, 0, ramp], [0, 0, 0]]·Δ)`` gives held and ramped parts alike."""
-        from scipy.linalg import expm  # half a second to import: a service that starts does not wait for it
+        with IMPORTING:
+            from scipy.linalg import expm  # half a second to import: a service that starts does not wait for it
 
         nodes, inputs = b.shape
         whole = np.zeros((nodes + inputs + 1, nodes + inputs + 1))

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from procedures.importing import IMPORTING
 from simulators.imu.blocks import Blocks
 from simulators.truth import Array, KeyedBlocks, TriadTruth, keyed_generator
 
@@ -200,7 +201,8 @@ class TriadNoise:
 
     def _bank_cells(self, state: SlowState) -> tuple[Array, Array]:
         """Sum over the bank of ``h·(x₀+x₁)`` in each cell, shape (cells, 3), and the bank's state at the end."""
-        from scipy.signal import lfilter  # half a second to import: a service that starts does not wait for it
+        with IMPORTING:
+            from scipy.signal import lfilter  # half a second to import: a service that starts does not wait for it
 
         bank = self._bank
         draws = self._draws("flicker", (len(bank.times_s), CELLS_PER_SLOW_BLOCK), state.block)

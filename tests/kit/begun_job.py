@@ -56,6 +56,8 @@ class NoWatch:
 
     def supervisor(self) -> None: ...
 
+    def silent_supervisor(self) -> None: ...
+
 
 def planner_of(stores: Stores, driver: SimulatedDriver) -> Planner:
     benches = BenchDirectory(stores.benches, stores.units, driver, "sim", drawn_unit, lambda _: "this process")

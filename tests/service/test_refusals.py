@@ -351,7 +351,7 @@ NO_UNIT = {"name": "gyro_x", "quantity": "angular_rate"}
     [
         ({"channels": [NO_UNIT]}, "channels.0.unit", "required"),
         ({"channels": [{**NO_UNIT, "unit": "m/s^2"}]}, "channels.0", "'m/s^2' is none of rad/s, mrad/s, deg/s"),
-        ({"channels": [{**GYRO_X, "scale": 0}]}, "channels.0", "the scale not zero"),
+        ({"channels": [{**GYRO_X, "scale": 0}]}, "channels.0.scale", "the scale not zero"),
         ({"rate_hz": -1}, "rate_hz", "greater than 0"),
         ({"rate_hz": float("nan")}, "rate_hz", "finite number"),
         ({"unit": ""}, "unit", "should match pattern"),

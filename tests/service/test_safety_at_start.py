@@ -30,7 +30,7 @@ class Scene:
         self.notes: list[tuple[str, str]] = []
         self.register, self.devices = register, RegisteredDevices(register)
         benches: Any = SimpleNamespace(stop_bench_once=self.stops.append)
-        watch: Any = SimpleNamespace(driving=lambda: driving, supervisor=lambda: None)
+        watch: Any = SimpleNamespace(driving=lambda: driving, supervisor=lambda: None, silent_supervisor=lambda: None)
         self.safety = SafetyService(benches, lambda _: self.devices, lambda _: watch, self.note)
 
     def note(self, job: str, kind: str, at: object, said: dict[str, Any]) -> None:

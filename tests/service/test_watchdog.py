@@ -252,7 +252,7 @@ def test_a_stop_tries_again_at_devices_that_an_attempt_has_given_up(
     assert runner.acquire(job.id, 0).failure is not None
     runner.stop_now()
     assert runner.make_safe(job.id).failure is not None
-    watch: Any = SimpleNamespace(supervisor=lambda: None)
+    watch: Any = SimpleNamespace(supervisor=lambda: None, silent_supervisor=lambda: None)
     stop_again = partial(driving._stop_now, runner, MagicMock(), watch)
     stop_again()
     assert not safe(driver)

@@ -243,12 +243,24 @@ def test_the_json_has_the_mounting_of_its_triads() -> None:
 
 
 @pytest.mark.parametrize("form", ["kalibr", "kalibr-imu", "openvins"])
-def test_a_density_of_zero_is_refused_for_kalibr_takes_none(form: str) -> None:
+def test_a_random_walk_of_zero_is_refused_for_kalibr_takes_none(form: str) -> None:
     """Kalibr's reader of imu.yaml raises for every density that is not above zero."""
     subject = a_subject()
-    silent = tuple(replace(c, rate_random_walk=0.0) for c in subject.noise["gyro"])
-    with pytest.raises(BadParameter, match=r"rate random walk K of the gyros; declare .* PUT /api/v1/units/U-1"):
+    silent = tuple(replace(c, random_walk=0.0) for c in subject.noise["gyro"])
+    with pytest.raises(BadParameter, match=r"that of the gyros is 0; declare .* PUT /api/v1/units/U-1"):
         text(form, replace(subject, noise={**subject.noise, "gyro": silent}))
+
+
+@pytest.mark.parametrize("form", ["kalibr", "kalibr-imu", "openvins"])
+def test_for_a_rate_random_walk_that_was_not_observed_stands_one_that_an_hour_would_hide(form: str) -> None:
+    subject = a_subject()
+    steady = tuple(replace(c, rate_random_walk=0.0) for c in subject.noise["gyro"])
+    written = text(form, replace(subject, noise={**subject.noise, "gyro": steady}))
+    (walk,) = (float(line.split(":")[1]) for line in written.splitlines() if "gyroscope_random_walk:" in line)
+    white = max(c.random_walk for c in steady)
+    assert walk * np.sqrt(3600.0 / 3.0) == pytest.approx(white / np.sqrt(3600.0))
+    assert "rate random walk of the gyros: 0, declared so or not observed" in written
+    assert "rate random walk of the accelerometers" not in written
 
 
 def _parameters(lines: str, cut: Callable[[str], tuple[str, float]]) -> dict[str, float]:

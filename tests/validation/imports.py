@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from pydantic import ValidationError
 from rich.console import Console
 
 from bench_service.formats.description import ImportDescription
@@ -61,8 +62,8 @@ def read_one(number: int, files: HostileFiles) -> tuple[str, str]:
         found = (
             ("ok", "") if rows == imported.count else ("fault", f"{rows} rows where {imported.count} were announced")
         )
-    except DomainError as error:
-        message = str(error)
+    except (DomainError, ValidationError) as error:  # of the description: 422 over HTTP, by its field
+        message = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
         found = ("refused", message) if len(message) <= LONGEST else ("fault", f"a message of {len(message)}")
     except MemoryError:
         found = ("refused", "takes more memory than is allowed")

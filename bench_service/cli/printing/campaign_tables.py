@@ -49,7 +49,7 @@ def schedule_table(items: list[dict[str, Any]]) -> Table:
     table = _table("schedule", "campaign", "unit", "cron", "zone", "next, UTC", "last outcome")
     for one in items:
         next_at = (one["next_at"] or "off")[:16].replace("T", " ")
-        times = ("once", "") if one["at"] else (one["cron"], one["time_zone"])
+        times = ("once", "") if one.get("at") else (one["cron"], one["time_zone"])
         row = (one["id"], one["campaign"], one["unit"], *times, next_at)
         table.add_row(*row, one["last_outcome"])
     return table

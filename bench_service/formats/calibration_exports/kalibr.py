@@ -20,22 +20,26 @@ FRAME = (
 
 def kalibr_noise(subject: CalibrationSubject) -> str:
     """Return the text of Kalibr's imu.yaml: noise of the noisiest channel, in densities. Raises `BadParameter` where a
-    noise is unknown or zero.
+    noise is unknown, or a random walk N zero.
     """
     subject.require_noise("kalibr-imu")
-    _require_densities(subject, "kalibr-imu")
     lines = commented(subject, "#", *_noise_remarks(subject))
-    return "\n".join([*lines, *_noise(subject), "rostopic: /imu0", f"update_rate: {_number(subject.rate_hz)}"]) + "\n"
+    return (
+        "\n".join(
+            [*lines, *_noise(subject, "kalibr-imu"), "rostopic: /imu0", f"update_rate: {_number(subject.rate_hz)}"]
+        )
+        + "\n"
+    )
 
 
 def kalibr_intrinsics(subject: CalibrationSubject) -> str:
     """Return the text of Kalibr's result with intrinsics of the model "scale-misalignment". Raises `BadParameter`."""
     force, rate, turn, rotation = _split(subject, "kalibr")
-    lines = commented(subject, "#", *FRAME, *_lost(subject))
+    known = len(subject.noise) == 2
+    lines = commented(subject, "#", *FRAME, *_lost(subject), *(_stand_ins(subject) if known else ()))
     lines += ["imu0:", *_identity("  T_i_b", 4)]
-    if len(subject.noise) == 2:
-        _require_densities(subject, "kalibr")
-        lines += [f"  {line}" for line in _noise(subject)]
+    if known:
+        lines += [f"  {line}" for line in _noise(subject, "kalibr")]
     lines += ["  accelerometers:", *_matrix("    M", force)]
     lines += [
         "  gyroscopes:",
@@ -53,10 +57,9 @@ def openvins(subject: CalibrationSubject) -> str:
     Raises `BadParameter`.
     """
     subject.require_noise("openvins")
-    _require_densities(subject, "openvins")
     force, rate, turn, rotation = _split(subject, "openvins")
     lines = ["%YAML:1.0", "---", *commented(subject, "#", *FRAME, *_noise_remarks(subject), *_lost(subject))]
-    lines += ["imu0:", *_identity("  T_i_b", 4), *(f"  {line}" for line in _noise(subject))]
+    lines += ["imu0:", *_identity("  T_i_b", 4), *(f"  {line}" for line in _noise(subject, "openvins"))]
     lines += [
         "  model: kalibr",
         "  rostopic: /imu0",
@@ -88,35 +91,56 @@ def _lost(subject: CalibrationSubject) -> list[str]:
 
 def _noise_remarks(subject: CalibrationSubject) -> list[str]:
     origin = [f"noise of the {name}s: {source}" for name, source in subject.noise_origin.items()]
-    return [*origin, "densities of the noisiest channel; quantization, bias instability and ramp have no field here"]
+    return [
+        *origin,
+        "densities of the noisiest channel; quantization, bias instability and ramp have no field here",
+        *_stand_ins(subject),
+    ]
 
 
-def _densities(subject: CalibrationSubject) -> dict[str, tuple[float, str]]:
-    """Fields with densities N [rate/√Hz] and K [rate/s/√Hz], and each in words; the bias instability belongs in no
-    field.
+UNSEEN_S = 3600.0
+"""Averaging time at which a rate random walk that was not observed equals the white noise in its stead [s]."""
+
+
+def _densities(subject: CalibrationSubject, form: str) -> dict[str, float]:
+    """Fields with densities N [rate/√Hz] and K [rate/s/√Hz]; the bias instability belongs in no field.
+
+    Kalibr and OpenVINS take none that is not above zero. For a K of zero stands ``N·√3/t``, whose Allan deviation
+    ``K·√(t/3)`` equals that of the white noise, ``N/√t``, at `UNSEEN_S`; comments say so. Raises `BadParameter` with
+    the way out where N is zero.
     """
-    found: dict[str, tuple[float, str]] = {}
+    found: dict[str, float] = {}
     for key, name in (("accelerometer", "accelerometer"), ("gyroscope", "gyro")):
-        channels = subject.noise[name]
-        found[f"{key}_noise_density"] = max(c.random_walk for c in channels), f"random walk N of the {name}s"
-        found[f"{key}_random_walk"] = max(c.rate_random_walk for c in channels), f"rate random walk K of the {name}s"
+        white, walk = _of_noisiest(subject, name)
+        if not white > 0.0:
+            allowed = (
+                f"a unit whose random walks N are above zero, for Kalibr and OpenVINS take no other: that of the {name}s "
+                f"is 0; declare a bound with PUT /api/v1/units/{subject.unit}, or take format json, pyins or navego"
+            )
+            raise BadParameter("format", form, allowed)
+        found[f"{key}_noise_density"] = white
+        found[f"{key}_random_walk"] = walk if walk > 0.0 else white * float(np.sqrt(3.0)) / UNSEEN_S
     return found
 
 
-def _require_densities(subject: CalibrationSubject, form: str) -> None:
-    """Check that all densities are above zero, as Kalibr's reader does. Raises `BadParameter` with the way out."""
-    zeros = [words for value, words in _densities(subject).values() if not value > 0.0]
-    if zeros:
-        allowed = (
-            f"a unit whose noise densities are above zero, for Kalibr and OpenVINS take no other: 0 (declared so, or "
-            f"not observed) is the {', the '.join(zeros)}; declare a bound with PUT /api/v1/units/{subject.unit}, or "
-            "take format json, pyins or navego"
-        )
-        raise BadParameter("format", form, allowed)
+def _stand_ins(subject: CalibrationSubject) -> list[str]:
+    """Comments on the rate random walks that are not the unit's."""
+    return [
+        f"rate random walk of the {name}s: 0, declared so or not observed, which this reader refuses; instead the one "
+        "whose Allan deviation equals that of the white noise after an hour"
+        for name in ("accelerometer", "gyro")
+        if not _of_noisiest(subject, name)[1] > 0.0
+    ]
 
 
-def _noise(subject: CalibrationSubject) -> list[str]:
-    return [f"{key}: {_number(value)}" for key, (value, _) in _densities(subject).items()]
+def _of_noisiest(subject: CalibrationSubject, name: str) -> tuple[float, float]:
+    """N and K of the noisiest channel of a triad."""
+    channels = subject.noise[name]
+    return max(c.random_walk for c in channels), max(c.rate_random_walk for c in channels)
+
+
+def _noise(subject: CalibrationSubject, form: str) -> list[str]:
+    return [f"{key}: {_number(value)}" for key, value in _densities(subject, form).items()]
 
 
 def _matrix(key: str, matrix: Array) -> list[str]:

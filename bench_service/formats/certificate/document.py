@@ -12,6 +12,7 @@ from typing import Any
 
 from bench_service.formats.certificate.laboratory import Contact, Laboratory
 from bench_service.formats.certificate.tree import Element, etree
+from procedures.importing import IMPORTING
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 VERSION = "3.3.0"
@@ -174,7 +175,8 @@ def _equipment(parent: Element, laboratory: Laboratory) -> None:
 
 
 def _coefficients(parent: Element, triad: Mapping[str, Any]) -> None:
-    from scipy.stats import chi2  # with all of scipy's statistics: only where it is called
+    with IMPORTING:
+        from scipy.stats import chi2  # with all of scipy's statistics: only where it is called
 
     rows, covariance = triad["coefficients"], triad["covariance"]["matrix"]
     units = [UNITS[row["unit"]] for row in rows]

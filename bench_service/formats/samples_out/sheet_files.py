@@ -21,6 +21,7 @@ from bench_service.formats.samples_out.distinct_names import distinct
 from bench_service.formats.samples_out.mcap_file import mcap
 from bench_service.formats.samples_out.sheet import Sheet
 from procedures.core.errors import BadParameter
+from procedures.importing import IMPORTING
 
 PIECE = 1 << 20
 MOST_IN_MATLAB = 8_000_000
@@ -158,7 +159,8 @@ def _matlab(sheet: Sheet) -> Iterator[bytes]:
     """One column vector a column, and the structs `about`, `units` and `channels`; `units` are those of the numbers as
     they are, and ``scale·(raw − offset)`` is in the unit of `channels`.
     """
-    from scipy.io import savemat
+    with IMPORTING:
+        from scipy.io import savemat
 
     blocks = list(sheet.blocks)
     names = distinct([_matlab_name(c.name) for c in sheet.columns], LONGEST_IN_MATLAB, STRUCTS_IN_MATLAB)

@@ -22,6 +22,7 @@ from procedures.analysis.least_squares.whitening import whitener
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, coefficient_unit
+from procedures.importing import IMPORTING
 
 FALSE_ALARM = 0.01
 """Chance that a triad of which nothing moved has a coefficient named, over all its candidates together."""
@@ -188,7 +189,8 @@ def _change(
 
 def _as_sigmas(statistic: float, degrees: int) -> float:
     """Normal deviation as likely, two-sided, as a chi-square so large; not past what doubles can tell apart."""
-    from scipy.stats import chi2  # with all of scipy's statistics: only where it is called
+    with IMPORTING:
+        from scipy.stats import chi2  # with all of scipy's statistics: only where it is called
 
     if degrees == 0:
         return 0.0

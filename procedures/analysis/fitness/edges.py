@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from procedures.analysis.fitness.pieces import Mask, Samples
 from procedures.core.arrays import Array
+from procedures.importing import IMPORTING
 
 NEIGHBOURS = 8
 """Levels that must exist in addition to the outermost one: a counter that reads −1, 0, 1 has no tail to cut off."""
@@ -131,7 +132,8 @@ class Edge:
 
 def _at_least(k: int, n: int, p: float) -> float:
     """Probability of k ≥ 1 or more of n at probability p each: I_p(k, n − k + 1) (Abramowitz & Stegun 26.5.24)."""
-    from scipy.special import betainc  # a service that starts does not wait for it
+    with IMPORTING:
+        from scipy.special import betainc  # a service that starts does not wait for it
 
     return float(betainc(k, n - k + 1, p))
 

@@ -15,6 +15,7 @@ from scipy.optimize import minimize
 from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.orientation_plan.information import Objective, information, prior
 from procedures.core.arrays import Array
+from procedures.importing import IMPORTING
 
 Indices = NDArray[np.int64]
 
@@ -47,7 +48,8 @@ def grid(settings: SearchSettings) -> Array:
 
 def best_orientations(count: int, objective: Objective, table: TableUncertainty, settings: SearchSettings) -> Array:
     """Return the table angles (count, 3) [deg] of least cost: outer, middle, inner. Takes seconds."""
-    from scipy.stats import qmc  # all of scipy's statistics for one sequence: only where it is used
+    with IMPORTING:
+        from scipy.stats import qmc  # all of scipy's statistics for one sequence: only where it is used
 
     candidates = grid(settings)
     known = [information(candidates, d, objective.model, table) for d in objective.designs]

@@ -16,6 +16,7 @@ from scipy.special import chdtrc
 from procedures.analysis.thermal.correlated import fit_linear
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.importing import IMPORTING
 
 CELL_S = 30.0
 """Cells in which the fit is judged: short against the board's delay, long against a reading's noise."""
@@ -49,7 +50,8 @@ class Following:
 
 def _exact(x: Array, tau: float, sample_s: float, start: float) -> Array:
     """First-order lag of a series that goes in straight lines between samples, beginning at `start`."""
-    from scipy.signal import lfilter  # with all of scipy's statistics: only where it is called
+    with IMPORTING:
+        from scipy.signal import lfilter  # with all of scipy's statistics: only where it is called
 
     if tau <= 0.0:
         return x

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace, regimes
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.importing import IMPORTING
 
 AXES = ("x", "y", "z")
 
@@ -24,7 +25,8 @@ def without_lag(reading_c: Array, sample_s: float, lag_s: float, window_s: float
     ``τ²·T''/2``. Also what stage one should be given: a converter that drifts 1e-4 m/s²/°C, read 5 s late on a ramp of
     1 °C/min, is 8e-6 m/s² wrong. Raises `BadParameter`, `UnfitRecording`.
     """
-    from scipy.signal import savgol_filter  # with all of scipy's statistics: only where it is called
+    with IMPORTING:
+        from scipy.signal import savgol_filter  # with all of scipy's statistics: only where it is called
 
     if not 0.0 <= lag_s < np.inf:
         raise BadParameter("lag_s", lag_s, "finite and not negative")
