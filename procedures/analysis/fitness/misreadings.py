@@ -9,12 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.analysis.fitness.findings import Finding, Kind, Severity
 from procedures.analysis.fitness.pieces import Piece, Samples
 from procedures.analysis.fitness.plausibility import COLDEST_C, HOTTEST_C
 from procedures.analysis.fitness.wording import Wording
-from procedures.core.recording import Channel
+from procedures.core.arrays import Array
+from procedures.core.recording import Channel, RawArray
 
 JUMP_K, SLEW_K_S, SLOWEST_S = 5.0, 1.0, 10.0
 """Least jump: this much and what the fastest thermometer changes by from sample to sample, at most so many seconds."""
@@ -43,9 +45,12 @@ class Misread:
     value: float
     """First reading of the run [raw]."""
 
-    def straight(self, indices: Samples) -> Samples:
-        """Return the straight line between the readings on either side, at samples of these numbers."""
-        return self.before + (self.after - self.before) * (indices - self.start + 1) / (self.stop - self.start + 1)
+    def mended(self, indices: NDArray[np.int64], values: RawArray) -> Array:
+        """Return, for the samples at some indices (n,) of the run, the straight line between the readings on either
+        side, in whole numbers where `values` (n,) are.
+        """
+        line = self.before + (self.after - self.before) * (indices - self.start + 1.0) / (self.stop - self.start + 1)
+        return np.rint(line) if np.issubdtype(values.dtype, np.integer) else line
 
 
 class Misreadings:
