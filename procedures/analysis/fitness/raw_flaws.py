@@ -78,7 +78,7 @@ def constant(
     return [Finding(Kind.CONSTANT, severity, told, 0, words.seen)]
 
 
-def beyond_reason(channel: Channel, low: float, high: float, words: Wording) -> list[Finding]:
+def impossible_values(channel: Channel, low: float, high: float, words: Wording) -> list[Finding]:
     """Return the finding on values too large, or too little varied, for a sensor in any unit: squares of them overflow
     or vanish. `low`, `high`: least and greatest value [raw].
     """

@@ -29,6 +29,7 @@ from procedures.core.recording import AROUND, INCREMENTS, Channel, RawArray, Rec
 _SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT, Kind.EVEN_STEPS)
 
 _FALSIFIES = (Kind.WRAPPED, Kind.CONSTANT, Kind.EVEN_STEPS, Kind.WRONG_UNIT)
+"""Findings after which the readings of a channel say nothing more of its unit or rate."""
 
 FEW_SHARE = 1e-3
 """Greatest share of outliers for which a result without them still represents the channel."""
@@ -176,9 +177,9 @@ class FitnessStream:
             return found + raw_flaws.constant(channel, edges[0].extreme, self._is_integer, words, settings)
         if words.seen < settings.least_samples or lost == words.seen:
             return found
-        beyond = raw_flaws.beyond_reason(channel, edges[1].extreme, edges[0].extreme, words)
-        if beyond:
-            return beyond
+        impossible = raw_flaws.impossible_values(channel, edges[1].extreme, edges[0].extreme, words)
+        if impossible:
+            return impossible
         changes = self._repeats.pairs - int(self._repeats.zeros[c]) if not lost else words.seen
         if raw_flaws.is_dead(channel, changes, words.seen, self._is_integer, settings):
             values = edges[1].extreme, edges[0].extreme

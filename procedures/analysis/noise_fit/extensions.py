@@ -35,6 +35,7 @@ GAIN_OF_TIME, GAIN_OF_CORNER = 16.0, 11.0
 _RATIO = 2.0**0.5
 """Ratio of two successive trial times."""
 _ALIASES = 8
+"""Aliases on either side that count in the power of sampled means."""
 _NO_CORNER, _LEAST_CORNER, _LEAST_TIME = 1e-4, 0.06, 2.0
 """Shortest corner and correlation time that are tried, in samples: a shorter corner looks like none at all."""
 _NEARBY = 1.4
@@ -205,8 +206,10 @@ def _has_white(joined: Joined, state: State) -> bool:
 
 
 def nearby(model: Extension | None, joined: Joined) -> list[Extension]:
-    """Return models like a fast extension, which its uncertainty allows for; for others a flicker that goes on, where
-    the highest bins are not fitted.
+    """Return models that the record may have instead of the one that was found.
+
+    Of a fast process: times within its uncertainty. Of a flicker with a short corner: all short corners. Otherwise a
+    flicker that goes on, where the highest bins are not fitted.
     """
     if model is not None and model.time_s is not None and model.spread > 0.0:
         return [model.scaled(exp(sign * _NEARBY * model.spread)) for sign in (-1.0, 0.0, 1.0)]
