@@ -112,7 +112,7 @@ def _limit(s: Scatter, params: Params) -> Limit | None:
 
 
 def _limit_of(triad: str, bias: bool, params: Params, unit: str) -> Limit | None:
-    """The limit with its source, None where there is none."""
+    """The limit with its source, the thesis or the request; None where there is none."""
     limit = largest(params, FIELDS[triad, bias], unit, SOURCE)
     return None if limit.maximum is None else limit
 
