@@ -106,11 +106,10 @@ def _schemas(params: type[Parameters], result: type[Outcome]) -> tuple[dict[str,
 @cache
 def _listed(*entries: tuple[str, str, str, type[Parameters], type[Outcome]]) -> bytes:
     """The catalogue as JSON, made once: every page with a choice of procedures asks for it."""
-    views = [
-        ProcedureView(name=name, title=title, version=version, parameters=schemas[0], result=schemas[1])
-        for name, title, version, *classes in entries
-        for schemas in [_schemas(*classes)]
-    ]
+    views: list[ProcedureView] = []
+    for name, title, version, params, result in entries:
+        of_params, of_result = _schemas(params, result)
+        views.append(ProcedureView(name=name, title=title, version=version, parameters=of_params, result=of_result))
     return VIEWS.dump_json(views)
 
 

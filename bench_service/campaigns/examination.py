@@ -21,7 +21,13 @@ from bench_service.campaigns.faults import (
 from bench_service.campaigns.gates import require_consistent
 from bench_service.campaigns.power import LimitPreview, preview
 from bench_service.jobs.planning import Plan, Planner
-from bench_service.jobs.procedure_calls import quantities_of, resolved, stations_of
+from bench_service.jobs.procedure_calls import (
+    expected_averaging_time_of,
+    planned_checks_of,
+    quantities_of,
+    resolved,
+    stations_of,
+)
 from bench_service.model.errors import NotFound
 from procedures.core.errors import BadParameter, DomainError, NoCalibration
 from procedures.core.limits import Limit, PlannedCheck
@@ -179,7 +185,8 @@ class Examiner:
 
     def _foreseen(self, step: Step, unit: str, bench: str | None, progress: Progress) -> tuple[Plan, tuple[str, ...]]:
         """The plan on the unit as earlier steps will leave it, as far as that is known, and what is not, in words."""
-        context, parameters, unknown = self._context(unit, bench, progress), step.parameters, ()
+        stored, parameters, unknown = self._planner.context(unit, bench), step.parameters, ()
+        context = replace(stored, unit=progress.record(stored.unit))
         wanted = parameters.get("thermal_correction") == "current" and context.unit.thermal_correction is None
         if wanted and progress.correcting:
             parameters, unknown = {**parameters, "thermal_correction": "none"}, (_CORRECTED,)
@@ -191,8 +198,7 @@ class Examiner:
                 raise
             plan = self._planner.plan_in(replace(context, unit=expected), step.does, parameters)
             unknown = (*unknown, _EXPECTED)
-        stored_s = self._planner.context(unit, bench).unit.averaging_time_s
-        return plan, (*unknown, *_of_averaging_time(plan, parameters, progress, stored_s))
+        return plan, (*unknown, *_of_averaging_time(plan, parameters, progress, stored.unit.averaging_time_s))
 
     def _planned(
         self, step: Step, where: str, plan: Plan, unknown: tuple[str, ...], progress: Progress, rule: DecisionRule
@@ -209,10 +215,10 @@ class Examiner:
             progress.planned[step.name] = prediction.uncertainties
         if procedure.corrections is not NO_CORRECTIONS:
             progress.correcting.add(step.name)
-        averaging_time_s = procedure.expected_averaging_time(plan.parameters, plan.context)
+        averaging_time_s = expected_averaging_time_of(procedure, plan.parameters, plan.context)
         if averaging_time_s is not None:
             progress.averaging_time_s, progress.averaging_time_of = averaging_time_s, step.name
-        checks = _previews(procedure.planned_checks(plan.parameters, plan.context), plan.parameters)
+        checks = _previews(planned_checks_of(procedure, plan.parameters, plan.context), plan.parameters)
         checks += [
             preview(_of_campaign(limit, prediction.uncertainties), rule_of(limit, rule)) for limit in step.limits
         ]
@@ -245,6 +251,8 @@ def _of_averaging_time(
     plan: Plan, parameters: Mapping[str, Any], progress: Progress, stored_s: float
 ) -> tuple[str, ...]:
     """The sentence on an averaging time that an earlier step is to give, where the plan's parameters follow it."""
+    if progress.averaging_time_s is None:
+        return ()
     unit, procedure = plan.context.unit, plan.procedure
     stored = replace(plan.context, unit=replace(unit, averaging_time_s=stored_s))
     if resolved(procedure, parameters, stored) == plan.parameters:

@@ -16,7 +16,7 @@ from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.model.calibrations import StoredCalibration
 from bench_service.model.context import context_of
 from bench_service.model.job import Job
-from bench_service.model.records import Idempotency, RecordingState, StoredResult
+from bench_service.model.records import Idempotency, RecordingState, StoredRecording, StoredResult
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
@@ -185,16 +185,23 @@ class AnalysisService:
         for stored in found:
             if stored.state is not RecordingState.COMPLETE:
                 raise UnfitRecording(f"recording {stored.info.id} is {stored.state.value}: kept, but not for analysis")
-        several = len({stored.job_id for stored in found}) > 1
-        jobs = {stored.job_id for stored in found if stored.job_id is not None and several}
-        begins = {job_id: f"job #{self._read_job(job_id).number}" for job_id in sorted(jobs)}
-        names = [
-            ", ".join([begins[one.job_id], *([one.info.station.label] if one.info.station else [])])
-            if one.job_id in begins
-            else ""
-            for one in found
+        named = zip(found, self._names(found), strict=True)
+        return tuple(self._stores.recordings.load(one.info.id, name) for one, name in named)
+
+    def _names(self, found: Sequence[StoredRecording]) -> list[str]:
+        """Names of recordings in the texts of an analysis: job and station, where they are not all of one job.
+
+        Empty: that of its file.
+        """
+        jobs = {one.job_id for one in found}
+        if len(jobs) < 2:
+            return [""] * len(found)
+        numbers = {job_id: self._read_job(job_id).number for job_id in jobs if job_id is not None}
+        stations = ["" if one.info.station is None else f", {one.info.station.label}" for one in found]
+        return [
+            "" if one.job_id is None else f"job #{numbers[one.job_id]}{station}"
+            for one, station in zip(found, stations, strict=True)
         ]
-        return tuple(self._stores.recordings.load(one.info.id, name) for one, name in zip(found, names, strict=True))
 
 
 def _unit_of(of_evidence: set[str], named: str | None) -> str | None:

@@ -1,7 +1,8 @@
 """A process that works out parts of an analysis together with a second one, which it forks from itself.
 
 Imports take a process longer than its part of an analysis of some hours. The fork is safe here: the first process has
-imported modules and done nothing else, no thread of it holds anything. The second ends with the first.
+imported modules and done nothing else. It has no other thread of Python; those of OpenBLAS and of Arrow's allocator are
+idle, and both libraries see to a fork themselves. The second process ends with the first.
 """
 
 import ctypes
@@ -9,11 +10,10 @@ import multiprocessing
 import os
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from importlib import import_module
-from threading import Thread
 from typing import TypeVar
 
 from bench_service.collector import no_collection
@@ -79,7 +79,8 @@ def both_numbers() -> list[int]:
 def shared_parts(work: Callable[[A], R], items: Sequence[A]) -> list[R | Refusal]:
     """Compute the parts in both processes, and return their results in order, a refused one as a `Refusal`.
 
-    Each takes the next part when it has done its last. Where the second one dies, the first does them all.
+    Each takes the next part when it has done its last. Where the second one dies, the first does them all. Raises an
+    error of either that is no refusal.
     """
     left, found = deque(enumerate(items)), dict[int, R | Refusal]()
 
@@ -91,13 +92,18 @@ def shared_parts(work: Callable[[A], R], items: Sequence[A]) -> list[R | Refusal
                 left.append((at, item))
                 return
 
-    second = Thread(target=by_the_second, name="parts of the second process", daemon=True)
-    second.start()
-    for at, item in _taken_from(left):
-        found[at] = _part(work, item)
-    second.join()
-    for at, item in _taken_from(left):
-        found[at] = _part(work, item)
+    def by_the_first() -> None:
+        for at, item in _taken_from(left):
+            found[at] = _part(work, item)
+
+    with ThreadPoolExecutor(1, "parts of the second process") as thread:
+        second = thread.submit(by_the_second)
+        try:
+            by_the_first()
+            second.result()  # raises an error that is no refusal
+            by_the_first()  # what one that died has left
+        finally:
+            left.clear()  # after such an error nobody wants the rest
     return [found[at] for at in range(len(items))]
 
 

@@ -7,10 +7,9 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.mountings import MountingStore
 from bench_service.evidence.catalogue import AnyProcedure, Catalogue
 from bench_service.evidence.units import UnitStore
-from bench_service.jobs.procedure_calls import predicted, quantities_of, resolved, stations_of
+from bench_service.jobs.procedure_calls import planned_checks_of, predicted, quantities_of, resolved, stations_of
 from bench_service.model.errors import NotFound, NotMounted
 from bench_service.model.mountings import StoredMounting
-from bench_service.telemetry.defects import author_is_named
 from bench_service.wall_clock import now
 from procedures.analysis.response.trace import ENCODER_CHANNELS
 from procedures.bench import BenchDescription
@@ -130,8 +129,7 @@ def _require_rules(procedure: AnyProcedure, parameters: Parameters, context: Con
     """Refuse a decision rule for a check that the result will not have, where its names are known beforehand."""
     rules = parameters.decision if isinstance(parameters, JudgedParameters) else None
     if rules is not None and rules.by_check:
-        with author_is_named(procedure.name, "planned_checks"):
-            planned = [one.check for one in procedure.planned_checks(parameters, context)]
+        planned = [one.check for one in planned_checks_of(procedure, parameters, context)]
         rules.require_known([*dict.fromkeys((*planned, *(quantities_of(procedure, parameters, context) or ())))])
 
 

@@ -9,6 +9,7 @@ from bench_service.evidence.catalogue import AnyProcedure
 from bench_service.formats.plain_json import faults
 from bench_service.telemetry.defects import author_is_named
 from procedures.core.errors import ProcedureDefect
+from procedures.core.limits import PlannedCheck
 from procedures.core.recording import Station
 from procedures.procedure import Context, Parameters, Prediction
 
@@ -69,6 +70,20 @@ def quantities_of(procedure: AnyProcedure, parameters: Parameters, context: Cont
         return None
     with author_is_named(procedure.name, "quantities"):
         return tuple(procedure.quantities(parameters, context))
+
+
+def planned_checks_of(procedure: AnyProcedure, parameters: Parameters, context: Context) -> tuple[PlannedCheck, ...]:
+    """Return the checks that the result will have, as far as the plan predicts them. Raises `ProcedureDefect`."""
+    with author_is_named(procedure.name, "planned_checks"):
+        return tuple(procedure.planned_checks(parameters, context))
+
+
+def expected_averaging_time_of(procedure: AnyProcedure, parameters: Parameters, context: Context) -> float | None:
+    """Return the averaging time that the result is expected to give the unit's record [s]; None where it gives none.
+    Raises `ProcedureDefect`.
+    """
+    with author_is_named(procedure.name, "expected_averaging_time"):
+        return procedure.expected_averaging_time(parameters, context)
 
 
 def _require_kind(procedure: AnyProcedure, function: str, given: object, kind: type) -> None:

@@ -69,6 +69,10 @@ class ReservationStore(Protocol):
         """Return one page of reservations, newest first; with `active_at` only those that hold at that moment."""
         ...
 
+    def active(self, at: datetime) -> tuple[Reservation, ...]:
+        """Return every reservation that holds at a moment, oldest first."""
+        ...
+
     def end(self, reservation_id: str, at: datetime) -> Reservation:
         """End a reservation early and return it; one that is over stays as it is. Raises `NotFound`."""
         ...
@@ -76,5 +80,4 @@ class ReservationStore(Protocol):
 
 def reservation_of_bench(store: ReservationStore, bench_id: str, at: datetime) -> Reservation | None:
     """Return the reservation that a bench is under at a moment; None where it is under none."""
-    active = store.list(active_at=at, limit=500).items
-    return next((one for one in active if one.kind is Reserved.BENCH and one.name == bench_id), None)
+    return next((one for one in store.active(at) if one.kind is Reserved.BENCH and one.name == bench_id), None)

@@ -96,14 +96,14 @@ class Notifier:
                     log.warning("messages to %s wait: %s", outbox.target.name, error)
 
     def _look(self) -> None:
+        silent = self._watch.silent_supervisor()  # first: it needs no database, which may be away
+        if silent is not None:
+            self._tell(of_silent_supervisor(self._bench, str(silent), now()))
         while self._changed:
             self._jobs_news(self._changed[0])
             self._changed.popleft()  # after it was read: a database that is away loses nothing
         for stop in self._stores.benches.standing_stops(self._bench):
             self._tell(of_stop(stop))
-        silent = self._watch.silent_supervisor()
-        if silent is not None:
-            self._tell(of_silent_supervisor(self._bench, str(silent), now()))
         for run in self._stores.campaigns.runs(limit=RUNS).items:
             if run.bench == self._bench and (run.finished_at or self._began) > self._began:
                 self._tell(of_run(run, now()))

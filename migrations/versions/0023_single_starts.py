@@ -6,6 +6,7 @@ Revision: 0023, after 0022
 import json
 from datetime import UTC, datetime
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import sqlalchemy as sa
 from alembic import op
@@ -56,10 +57,11 @@ def _moment(schedule: dict[str, Any]) -> str:
     known = schedule["last_at"] or schedule["next_at"]
     if known is not None:
         return known
-    made = datetime.fromisoformat(schedule["created_at"]).astimezone(UTC)
     try:
+        zone = ZoneInfo(schedule["time_zone"])
+        made = datetime.fromisoformat(schedule["created_at"]).astimezone(zone)
         minute, hour, day, month = (int(field) for field in schedule["cron"].split()[:4])
-        starts = [datetime(made.year + years, month, day, hour, minute, tzinfo=UTC) for years in (0, 1)]
-    except ValueError:
+        starts = [datetime(made.year + years, month, day, hour, minute, tzinfo=zone) for years in (0, 1)]
+    except (ValueError, KeyError, OSError):  # of the zone too: it is not installed, or has another name by now
         return schedule["created_at"]
-    return next((at for at in starts if at > made), made).isoformat()
+    return next((at for at in starts if at > made), made).astimezone(UTC).isoformat()

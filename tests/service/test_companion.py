@@ -181,23 +181,31 @@ def test_a_supervisor_that_lives_without_a_heartbeat_is_killed_and_another_one_i
     assert len(host.started) == 2
 
 
-def test_a_supervisor_that_may_not_be_killed_is_said_once(
+@pytest.mark.parametrize(
+    ("permitted", "said"),
+    [(False, "belongs to another user: nobody watches over the bench"), (True, "killed, and another one is started")],
+)
+def test_a_supervisor_that_may_not_be_killed_or_ends_late_is_said_once(
     tmp_path: Path,
     host: Host,
     supervisor: subprocess.Popen[bytes],
     beating: HeartbeatFile,
     caplog: pytest.LogCaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
+    permitted: bool,
+    said: str,
 ) -> None:
-    def refused(_: ProcessIdentity) -> bool:
-        raise PermissionError
+    def kill(_: ProcessIdentity) -> bool:
+        if not permitted:
+            raise PermissionError
+        return True  # the signal is sent, and the process waits in the kernel
 
-    monkeypatch.setattr(ProcessIdentity, "kill", refused)
+    monkeypatch.setattr(ProcessIdentity, "kill", kill)
     silence = SilenceCounter(HeartbeatFile(tmp_path, "sim", of_supervisor=True))
     companion = Companion("sim", host.spawn, lambda: identity(supervisor), silence)
     for quarter in range(100):
         companion.look(quarter / 4)
-    assert caplog.text.count("belongs to another user: nobody watches over the bench") == 1
+    assert caplog.text.count(said) == 1
 
 
 def test_who_looks_sees_that_a_supervisor_lives_and_is_silent(

@@ -11,18 +11,22 @@ from datetime import UTC, datetime, timedelta
 from email import message_from_string
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from bench_service.cli.asking.client import connect
-from bench_service.model.errors import Misconfigured
+from bench_service.model.errors import Misconfigured, StorageFailure
+from bench_service.model.records import BenchStop
 from bench_service.notifications.channels import SIGNATURE
 from bench_service.notifications.messages import Message
+from bench_service.notifications.notifier import Notifier
 from bench_service.notifications.outbox import FIRST_PAUSE, OLDEST, Outbox
 from bench_service.notifications.targets import Mail, Webhook, read_targets
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings
-from bench_service.wall_clock import monotonic_s, pause
+from bench_service.wall_clock import monotonic_s, now, pause
 from procedures.bench import BenchDescription
 from tests.kit.supervised_bench import GONE
 from tests.service.client import FAST, Client
@@ -286,6 +290,24 @@ def until(true: Callable[[], bool]) -> None:
     while not true():
         assert monotonic_s() < deadline
         pause(0.05)
+
+
+def test_a_silent_supervisor_is_told_of_where_the_database_is_away(
+    tmp_path: Path, hook: _Hook, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def away(_: str) -> tuple[BenchStop, ...]:
+        raise StorageFailure("the database is away")
+
+    monkeypatch.setattr(HostFiles, "silent_supervisor", lambda _: GONE.process)
+    stores: Any = SimpleNamespace(
+        jobs=SimpleNamespace(on_event=lambda _: None), benches=SimpleNamespace(standing_stops=away)
+    )
+    box = outbox(tmp_path, hook)
+    notifier = Notifier("sim", stores, [box], lambda: None, 0, HostFiles(tmp_path, "sim"))
+    with pytest.raises(StorageFailure):
+        notifier._look()
+    box.send(now())
+    assert kinds(hook) == ["trouble"]
 
 
 def test_a_bench_tells_of_verdicts_prompts_failed_nights_stops_and_a_silent_supervisor(

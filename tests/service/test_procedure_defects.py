@@ -159,6 +159,8 @@ DEFECTIVE = {
     "predict_raises": replace(SOUND, predict=raising(ZeroDivisionError("dwell"))),
     "predict_gives_nothing": replace(SOUND, predict=lambda params, context: None),
     "predicts_nan": replace(SOUND, predict=lambda params, context: Prediction(math.nan)),
+    "planned_checks_raises": replace(SOUND, planned_checks=raising(KeyError("limit"))),
+    "expected_averaging_time_raises": replace(SOUND, expected_averaging_time=raising(KeyError("limit"))),
 }
 REFUSED_PLANS = {
     "schedule_raises": "`schedule` of procedure schedule_raises failed: KeyError: 'dwell' (",
@@ -293,6 +295,14 @@ def test_a_plan_that_cannot_be_is_refused_before_anything_moves(
     if sentence.endswith("("):  # the place: this procedure lies beside the project's code, so its caller's
         assert "(bench_service/jobs/procedure_calls.py, line " in answer.json()["detail"]
     assert client.stored() == before
+
+
+@pytest.mark.parametrize("function", ["planned_checks", "expected_averaging_time"])
+def test_a_campaign_with_a_procedure_that_fails_in_planning_is_refused(client: Client, function: str) -> None:
+    only = [{"name": "only", "procedure": f"{function}_raises"}]
+    answer = client.http.post("/api/v1/campaigns", json={"name": "defective", "steps": only})
+    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/ProcedureDefect")
+    assert f"`{function}` of procedure {function}_raises failed: KeyError: 'limit' (" in answer.json()["detail"]
 
 
 def test_a_result_whose_report_cannot_be_made_is_shown_without_it(client: Client) -> None:

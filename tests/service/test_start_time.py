@@ -5,6 +5,7 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
+from bench_service.campaigns import schedule
 from bench_service.cli.asking.start_time import FARTHEST, start_time
 from bench_service.cli.refusal import Refused
 from bench_service.wall_clock import now
@@ -38,3 +39,8 @@ def test_a_day_and_a_zone_of_its_own() -> None:
 def test_another_time_is_refused_with_the_way_out(text: str, zone: str | None, words: str) -> None:
     with pytest.raises(Refused, match=words):
         start_time(text, zone)
+
+
+def test_the_command_takes_times_as_far_ahead_as_the_service() -> None:
+    """Two constants: the command imports no campaigns to say no."""
+    assert FARTHEST == schedule.FARTHEST

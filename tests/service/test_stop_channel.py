@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Thread
@@ -84,6 +85,22 @@ def test_a_stop_beyond_the_room_of_the_file_is_answered_and_stands_after_the_oth
     assert {asking.state(word.id) for word in late} == {"safe"}
     worker.clear(word.id for word in words)
     assert {word.id for word in worker.standing()} == {word.id for word in late}
+
+
+def test_a_stop_in_memory_stands_also_while_it_is_marked(channel: StopChannel) -> None:
+    """The stop guard's thread reads it while another one exchanges stops with the database."""
+    for number in range(WORDS):
+        channel.ask(StopWord(f"reason {number}", "somebody", "http"))
+    channel._take(late := StopWord("late", "Olena", "command"))
+    standing: list[bool] = []
+
+    def looked(word: StopWord) -> StopWord:
+        standing.append(late.id in {one.id for one in channel.standing()})
+        return replace(word, booked=True)
+
+    channel._change([late.id], looked)
+    assert standing == [True]
+    assert [one.booked for one in channel.standing() if one.id == late.id] == [True]
 
 
 def test_a_stop_that_no_process_keeps_is_as_far_as_the_least_of_those_that_stand(channel: StopChannel) -> None:

@@ -19,6 +19,8 @@ CASES: dict[str, tuple[dict[str, Any], str | None, str | None]] = {
     "was": ({"last_at": LAST, **OFF}, LAST, None),
     "was switched on again, for the next year": ({"next_at": NEXT, "last_at": LAST}, LAST, None),
     "off before its start": (OFF, NEXT, None),
+    "off, on the clock of Kyiv": ({"time_zone": "Europe/Kyiv", **OFF}, "2027-02-03T18:30:00+00:00", None),
+    "off, of an unknown zone": ({"time_zone": "Atlantis", **OFF}, MADE, None),
     "of another line": ({"cron": "*/5 1 * * *", **OFF}, MADE, None),
     "nightly": ({"next_at": NEXT, **NIGHTLY}, None, NEXT),
 }

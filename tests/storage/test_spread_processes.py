@@ -106,6 +106,21 @@ def test_where_a_process_dies_the_work_is_done_here_and_the_next_begins_anew() -
         assert each(_own_number, [1, 2]) == [here, here], "a closed service begins no process"
 
 
+def _fails_in_the_second(service: int) -> int:
+    if os.getppid() != service:
+        raise TypeError("boom")
+    pause(0.3)  # so the second one takes a part
+    return service
+
+
+def test_an_error_of_the_second_process_that_nobody_foresaw_comes_as_it_is(processes: SpreadProcesses) -> None:
+    here = os.getpid()
+    with spread_over(processes), pytest.raises(TypeError, match="boom"):
+        each(_fails_in_the_second, [here, here])
+    with spread_over(processes):
+        assert here not in each(_own_number, [1, 2]), "the processes go on"
+
+
 def test_idle_processes_end_and_short_recordings_begin_none() -> None:
     shared = SpreadProcesses(idle_s=0.2)
     shared.begin(MANY_VALUES - 1)

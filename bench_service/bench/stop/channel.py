@@ -29,7 +29,7 @@ from bench_service.bench.records_in_place import (
     read_record,
     write_record,
 )
-from bench_service.bench.stop.channel_records import document_in, words_in
+from bench_service.bench.stop.channel_records import document_in, flocked, words_in
 from bench_service.bench.stop.folder_sockets import bound, send
 from bench_service.bench.stop.word import DAMAGED, StopAnswer, StopWord
 from bench_service.wall_clock import monotonic_s, pause
@@ -105,7 +105,7 @@ class StopChannel:
             log.warning("the stop channel of bench %s cannot be read: %s", self.bench_id, error)
             found = self._last[1]
         there = {word.id for word in found}
-        came = [word for word in self._came.values() if word.id not in there]
+        came = [word for word in list(self._came.values()) if word.id not in there]
         return tuple(sorted((*found, *came), key=lambda word: word.at))
 
     def mark_booked(self, ids: Iterable[str]) -> None:
@@ -221,7 +221,7 @@ class StopChannel:
         file, deadline = self._open(), monotonic_s() + LOCK_S
         mine = self._mutex.acquire(timeout=LOCK_S)
         try:
-            while not _flocked(file) and monotonic_s() < deadline:
+            while not flocked(file) and monotonic_s() < deadline:
                 pause(0.002)
             yield file
         finally:
@@ -267,9 +267,11 @@ class StopChannel:
         wanted = set(ids)
         if not wanted:
             return
-        for word_id in wanted & set(self._came):
-            changed = change(self._came.pop(word_id))
-            if changed is not None:
+        for word_id in wanted & set(self._came):  # never away for a moment: the guard's thread reads it meanwhile
+            changed = change(self._came[word_id])
+            if changed is None:
+                del self._came[word_id]
+            else:
                 self._came[word_id] = changed
         try:
             self._change_file(wanted, change)
@@ -292,11 +294,3 @@ class StopChannel:
         body = json.dumps(message).encode()
         sent = [send(self._folder, self._names[role], body) for role in roles]
         return any(sent)
-
-
-def _flocked(file: int) -> bool:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True

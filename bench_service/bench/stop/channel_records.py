@@ -1,5 +1,9 @@
-"""Records of a stop channel as stop requests; one of another version that is none is as unreadable as a torn one."""
+"""Records in the file of a stop channel as stop requests, and the file's lock.
 
+A record of another version, which is no stop request, is as unreadable as a torn one.
+"""
+
+import fcntl
 from typing import Any
 
 from bench_service.bench.records_in_place import RECORD_BYTES, Unreadable, decoded, read_record
@@ -31,6 +35,15 @@ def document_in(file: int, number: int) -> dict[str, Any] | None:
         return found if found is None else _word(found).document()
     except Unreadable:
         return {"id": DAMAGED.id}
+
+
+def flocked(file: int) -> bool:
+    """Lock a stop channel's file against other processes; False where another one has the lock. Never waits."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def _word(document: dict[str, Any]) -> StopWord:

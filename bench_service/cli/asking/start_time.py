@@ -8,7 +8,7 @@ from bench_service.wall_clock import now
 
 FORMS = "HH:MM (the next one), 'YYYY-MM-DD HH:MM', or with a zone 2026-12-01T22:30+02:00"
 FARTHEST = timedelta(days=50 * 366)
-"""Longest time ahead of a single start: a later one is a slip of the keyboard."""
+"""Longest time ahead of a single start, as `campaigns.schedule` has it: a later one is a slip of the keyboard."""
 
 
 def start_time(text: str, zone: str | None = None) -> datetime:
@@ -33,7 +33,7 @@ def start_time(text: str, zone: str | None = None) -> datetime:
     if at <= now():
         raise Refused(f"--at {text!r} has passed: it is {now().astimezone(at.tzinfo):%Y-%m-%d %H:%M %Z} now")
     if at > now() + FARTHEST:
-        raise Refused(f"--at {text!r} is more than {FARTHEST.days} days ahead")
+        raise Refused(f"--at {text!r}: a time at most {FARTHEST.days} days ahead (50 years) is needed")
     return at
 
 

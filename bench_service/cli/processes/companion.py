@@ -58,8 +58,8 @@ class Companion:
         self._spawn = spawn
         self._supervisor = supervisor
         self._silence = silence
-        self._not_ended: ProcessIdentity | None = None
-        """A silent supervisor that this process may not kill."""
+        self._logged: ProcessIdentity | None = None
+        """The last silent supervisor that was logged."""
         self._process: Process | None = None
         self._started_s = -inf
         self._due_s = -inf
@@ -93,17 +93,26 @@ class Companion:
             self._process.returncode = 0  # no one waits for the process any more
 
     def _end_silent(self, supervisor: ProcessIdentity) -> None:
-        """Kill a supervisor without a heartbeat: its right to supervise ends with it."""
-        what = (
-            f"the supervisor of bench {self._bench_id}, {supervisor}, gave no heartbeat for {SUPERVISOR_KILLED_S:g} s"
-        )
+        """Kill a supervisor without a heartbeat: its right to supervise ends with it. It is logged once, though a
+        process that waits in the kernel ends late.
+        """
         try:
-            if supervisor.kill():
-                log.warning("%s: killed, and another one is started", what)
+            if not supervisor.kill():
+                return
+            level, outcome = logging.WARNING, "killed, and another one is started"
         except PermissionError:
-            if supervisor != self._not_ended:
-                log.error("%s, and belongs to another user: nobody watches over the bench until it is ended", what)
-            self._not_ended = supervisor
+            level = logging.ERROR
+            outcome = "it belongs to another user: nobody watches over the bench until it is ended (kill -9)"
+        if supervisor != self._logged:
+            log.log(
+                level,
+                "the supervisor of bench %s, %s, gave no heartbeat for %g s: %s",
+                self._bench_id,
+                supervisor,
+                SUPERVISOR_KILLED_S,
+                outcome,
+            )
+        self._logged = supervisor
 
     def _start(self, now_s: float) -> None:
         self._started_s = now_s

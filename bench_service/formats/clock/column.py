@@ -61,10 +61,10 @@ class Standstill:
         """Add steps [s], those of length zero among them, and the row, from 0, that the first of them leads to."""
         if not len(steps):
             return
-        moving = np.flatnonzero(steps != 0.0) if len(still) else np.empty(0, np.intp)
         if not len(still):  # of a clock that moves, only the last row can begin a run
             self._row, self._rows, self._step_before_s = row + len(steps) - 1, 1, float(steps[-1])
             return
+        moving = np.flatnonzero(steps != 0.0)
         begins = np.concatenate([[self._row], row + moving])
         lengths = np.diff(np.concatenate([[row - self._rows], row + moving, [row + len(steps)]]))
         before = np.concatenate([[self._step_before_s], steps[moving]])

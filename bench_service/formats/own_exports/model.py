@@ -75,10 +75,11 @@ class OwnExport:
             "and a calibration of it would correct twice"
             for triad, known in self.corrected_by.items()
         ]
-        warmth = {k.removeprefix(TEMPERATURE): v for k, v in self.facts.items() if k.startswith(TEMPERATURE)}
         found += [
-            f"corrected for temperature by {known} ({kind}): what comes of it is no output of the unit as it is"
-            for kind, known in warmth.items()
+            f"corrected for temperature by {known} ({name.removeprefix(TEMPERATURE)}): "
+            "what comes of it is no output of the unit as it is"
+            for name, known in self.facts.items()
+            if name.startswith(TEMPERATURE)
         ]
         if self.decimated_by > 1:
             found.append(f"each row is the mean of {self.decimated_by} samples: its noise is not that of the unit")

@@ -133,13 +133,13 @@ def physical_sheet(part: Extract, blocks: Iterable[RawArray], treatment: Treatme
         about[f"{CORRECTION}{calibration.triad}"] = _formula(calibration)
         for index in place:
             units[index] = calibration.input_unit
-    warmth = stages(part, asked.corrections)
+    by_temperature = stages(part, asked.corrections)
     columns = _physical_columns(part, units, about, asked)
     for correction, known in zip(asked.corrections, asked.correction_ids, strict=True):
         about |= {f"{TEMPERATURE}{correction.kind}": known, f"fitted_range_{correction.kind}": fitted_range(correction)}
         about["sensors"] = SENSORS_AS_READ
     scale = NominalScale.of(part.info.channels, part.info.rate_hz)
-    values = _means(_corrected(blocks, scale, warmth, places), asked.decimate)
+    values = _means(_corrected(blocks, scale, by_temperature, places), asked.decimate)
     return Sheet((TIME, *columns), about, rows, _timed(part, values, asked.decimate))
 
 
@@ -183,13 +183,13 @@ def _place(part: Extract, calibration: TriadCalibration) -> list[int]:
 def _corrected(
     blocks: Iterable[RawArray],
     scale: NominalScale,
-    warmth: Sequence[Stage],
+    by_temperature: Sequence[Stage],
     places: list[tuple[list[int], Array, Array]],
 ) -> Iterator[Array]:
     for block in blocks:
         values = scale.rates(np.asarray(block, dtype=np.float64))
-        read = values.copy() if warmth else values
-        for stage in warmth:
+        read = values.copy() if by_temperature else values
+        for stage in by_temperature:
             stage(values, read)
         for place, bias, inverse in places:
             values[:, place] = (values[:, place] - bias) @ inverse.T

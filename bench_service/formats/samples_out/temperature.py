@@ -1,7 +1,8 @@
 """Temperature corrections of samples on their way out: to the reference temperatures, by the unit's own sensors.
 
-The formulas are those by which a calibration uses the corrections; here each sample goes by the sensors' readings of
-own moment, whose lag is not taken out: of a sensor τ late on a ramp the correction is τ·dT/dt behind.
+The formulas are those by which a calibration uses the corrections. Here each sample is corrected by the sensors'
+readings of the same moment, and the sensors' lag is not taken out: where a sensor is τ late, the temperature that a
+sample is corrected for is τ·dT/dt behind.
 """
 
 from collections.abc import Callable, Sequence

@@ -29,8 +29,8 @@ function row(one) {
 }
 
 async function find(after = null) {
-  const given = after ? shown : [...new FormData(search)].map(([name, value]) => [name, value.trim()]).filter(([, value]) => value);
-  if (!after) given.splice(0, given.length, ...Object.entries(moments(Object.fromEntries(given))));
+  const typed = [...new FormData(search)].map(([name, value]) => [name, value.trim()]).filter(([, value]) => value);
+  const given = after ? shown : Object.entries(moments(Object.fromEntries(typed)));
   const asked = new URLSearchParams([...given, ["limit", "50"], ...(after ? [["after", after]] : [])]);
   const page = await busy(search.querySelector("button"), search.querySelector("output"), () => read(`/api/v1/recordings?${asked}`));
   if (!page) return;

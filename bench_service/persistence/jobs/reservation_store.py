@@ -62,6 +62,10 @@ class SqlReservationStore:
         with self._database.read() as session:
             return page(session, query, ReservationRow.id, after, limit, reservation_of_row)
 
+    def active(self, at: datetime) -> tuple[Reservation, ...]:
+        with self._database.read() as session:
+            return active_reservations(session, at)
+
     def end(self, reservation_id: str, at: datetime) -> Reservation:
         with self._database.write() as session:
             row = _found(session, reservation_id)
