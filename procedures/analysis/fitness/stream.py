@@ -180,8 +180,8 @@ class FitnessStream:
         impossible = raw_flaws.impossible_values(channel, edges[1].extreme, edges[0].extreme, words)
         if impossible:
             return impossible
-        changes = self._repeats.pairs - int(self._repeats.zeros[c]) if not lost else words.seen
-        if raw_flaws.is_dead(channel, changes, words.seen, self._is_integer, settings):
+        changes = self._repeats.pairs - int(self._repeats.zeros[c])
+        if not lost and raw_flaws.is_dead(channel, changes, words.seen, self._is_integer, settings):
             values = edges[1].extreme, edges[0].extreme
             return found + raw_flaws.dead(channel, values, changes, self._first_change[c], words)
         wrap = self._wraps.found(c, edges[1].extreme, edges[0].extreme)
