@@ -12,15 +12,16 @@ from procedures.analysis.turns.ferraris import analyse_ferraris, rest_means
 from procedures.analysis.turns.summary import WholeTurns
 from procedures.core import units
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.recording import AXES, TRIADS, Recording
 from procedures.core.report import Report
 from procedures.core.site import Site
 from procedures.core.unit import Unit
-from procedures.parameters import Parameters, planned_tests
+from procedures.parameters import Parameters, largest, level_check, planned_tests
 from procedures.procedure import Outcome
 from procedures.reports import calibration as pictures
 from procedures.reports import whole_turns as of_turns
+from procedures.triad_checks import RESIDUALS
 
 
 class FerrarisLimits(Parameters):
@@ -37,13 +38,7 @@ class FerrarisLimits(Parameters):
     @property
     def of_scale(self) -> Limit:
         """Limit of the gyros' scale factors, with its source."""
-        most = self.gyro_scale_3_sigma_ppm
-        return Limit("ppm", maximum=most, source=self.source_of("gyro_scale_3_sigma_ppm"))
-
-    @property
-    def level_source(self) -> str:
-        """Source of the level of the residuals' tests."""
-        return self.source_of("residual_p_value_min", SIGNIFICANCE)
+        return largest(self, "gyro_scale_3_sigma_ppm", "ppm")
 
 
 class Result(Outcome):
@@ -91,9 +86,6 @@ def report(result: Result) -> Report:
     return Report(sections=(*tables, *pictures.triad_figures(force), pictures.station_table(force.magnitudes)))
 
 
-RESIDUALS = "residuals, p-value of chi-square"
-
-
 def planned_residuals(limits: FerrarisLimits, unit: Unit) -> tuple[PlannedCheck, ...]:
     """Return the planned tests of the residuals of triads whose noise is known."""
     known = [triad for triad in TRIADS if unit.triad(triad) is not None]
@@ -106,16 +98,15 @@ def _gyro_checks(found: WholeTurns, limits: FerrarisLimits) -> list[Check]:
         check(f"gyro scale factor {axis}, 3σ", 3.0 * sd, limits.of_scale) for axis, sd in zip(AXES, sd_ppm, strict=True)
     ]
     if found.p_value is not None:
-        name, level = f"gyro {RESIDUALS}", limits.residual_p_value_min
-        checks.append(significance(name, found.p_value, level, source=limits.level_source))
+        checks.append(level_check(limits, "residual_p_value_min", f"gyro {RESIDUALS}", found.p_value))
     return checks
 
 
 def _force_checks(found: TriadSummary, limits: FerrarisLimits) -> list[Check]:
-    most = Limit("1", maximum=limits.condition_max, source=limits.source_of("condition_max"))
+    most = largest(limits, "condition_max", "1")
     checks = [check("accelerometer condition number", found.condition, most)]
     checks.append(own_axis_check("accelerometer", found.calibration.matrix_array))
     if found.p_value is not None:
-        level, note = limits.residual_p_value_min, found.residual_note
-        checks.append(significance(f"accelerometer {RESIDUALS}", found.p_value, level, note, limits.level_source))
+        name = f"accelerometer {RESIDUALS}"
+        checks.append(level_check(limits, "residual_p_value_min", name, found.p_value, found.residual_note))
     return checks

@@ -204,9 +204,7 @@ def quantities(params: FitParameters) -> tuple[str, ...]:
 
 def planned_residuals(params: FitParameters, triads: Sequence[str]) -> tuple[PlannedCheck, ...]:
     """Return the planned tests of the residuals of triads whose noise is known."""
-    return planned_tests(
-        params, "residual_p_value_min", *(f"{triad} residuals, p-value of chi-square" for triad in triads)
-    )
+    return planned_tests(params, "residual_p_value_min", *(f"{triad} {RESIDUALS}" for triad in triads))
 
 
 def report(result: Result) -> Report:

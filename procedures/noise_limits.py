@@ -199,10 +199,8 @@ def surroundings_checks(
             else:
                 found.append(check(f"{name} readiness time", 0.0, limit, note="no warm-up was found"))
         if limits.absence_level is not None:
-            source, level = (
-                source_of(limits.absence_level, ABSENCE_LEVEL, ABSENCE),
-                limits.absence_level / (2 * len(channels)),
-            )
+            source = source_of(limits.absence_level, ABSENCE_LEVEL, ABSENCE)
+            level = limits.absence_level / (2 * len(channels))
             for process in SLOW:
                 p_values = [c.coefficient(process).likelihood.p_value for c in of_launches]
                 least = min((p for p in p_values if p is not None), default=1.0)

@@ -6,7 +6,18 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from procedures.core.errors import BadParameter
-from procedures.core.limits import COVERAGE, OURS, SIGNIFICANCE, Limit, PlannedCheck, Rule, RuleName, source_of
+from procedures.core.limits import (
+    COVERAGE,
+    OURS,
+    SIGNIFICANCE,
+    Check,
+    Limit,
+    PlannedCheck,
+    Rule,
+    RuleName,
+    significance,
+    source_of,
+)
 
 
 class Parameters(BaseModel):
@@ -30,6 +41,11 @@ def planned_tests(params: Parameters, field: str, *checks: str) -> tuple[Planned
         return ()
     limit = Limit("1", minimum=level, source=params.source_of(field, SIGNIFICANCE))
     return tuple(PlannedCheck(name, limit, level=level) for name in checks)
+
+
+def level_check(params: Parameters, field: str, check: str, p_value: float, note: str = "") -> Check:
+    """Return the check of a test of significance at the level in this field (`core.limits.significance`)."""
+    return significance(check, p_value, getattr(params, field), note, params.source_of(field, SIGNIFICANCE))
 
 
 def largest(params: Parameters, field: str, unit: str, source: str = OURS) -> Limit:

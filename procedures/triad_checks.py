@@ -6,17 +6,18 @@ from procedures.analysis.orientation_plan.requirements import IN_RUN_SOURCE
 from procedures.analysis.own_axes import own_axis_check
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.limits import OURS, SIGNIFICANCE, Check, Limit, check, significance
-from procedures.parameters import Parameters, largest
+from procedures.core.limits import OURS, Check, Limit, check
+from procedures.parameters import Parameters, largest, level_check
 
 RESIDUALS = "residuals, p-value of chi-square"
-"""Name of the check, behind its triad's."""
+"""Name of the check, after the triad's."""
 
 
 def in_run_limit(triad: str, limits: Parameters) -> Limit:
     """Return the limit on a triad's error per axis with its source; no maximum where `limits` has none."""
-    field, unit = {"gyro": ("gyro_bias_in_run_deg_h", "deg/h")}.get(triad, ("accelerometer_bias_in_run_m_s2", "m/s^2"))
-    return Limit(unit, maximum=getattr(limits, field), source=limits.source_of(field, IN_RUN_SOURCE))
+    if triad == "gyro":
+        return largest(limits, "gyro_bias_in_run_deg_h", "deg/h", IN_RUN_SOURCE)
+    return largest(limits, "accelerometer_bias_in_run_m_s2", "m/s^2", IN_RUN_SOURCE)
 
 
 def triad_checks(t: TriadSummary, in_run: Limit, limits: Parameters) -> list[Check]:
@@ -42,11 +43,10 @@ def fit_checks(
     """Return the checks of condition, own axes, and residuals by p-value or misfit; `allowing`: what the misfit allows
     for.
     """
-    triad, most, level = t.calibration.triad, "condition_max", "residual_p_value_min"
-    checks = [check(f"{triad} condition number", condition, largest(limits, most, "1")), own_axis_check(triad, matrix)]
+    triad, most = t.calibration.triad, largest(limits, "condition_max", "1")
+    checks = [check(f"{triad} condition number", condition, most), own_axis_check(triad, matrix)]
     if p_value is not None:
-        name, source = f"{triad} {RESIDUALS}", limits.source_of(level, SIGNIFICANCE)
-        checks.append(significance(name, p_value, getattr(limits, level), t.residual_note, source))
+        checks.append(level_check(limits, "residual_p_value_min", f"{triad} {RESIDUALS}", p_value, t.residual_note))
     elif misfit is not None:
         limit = Limit("1", maximum=MISFIT_MAX, source=OURS)
         checks.append(check(f"{triad} residuals over what {allowing} allow", misfit, limit, note=f"worst: {t.worst}"))

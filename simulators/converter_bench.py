@@ -29,8 +29,9 @@ def current_source(bench: BenchTruth, seed: int, now_s: Callable[[], float]) -> 
 def converter_alone(
     unit: UnitTruth, clock: SimClock, supply: SimSupply, chamber: SimChamber | None, source: SimCurrentSource
 ) -> ConverterLink:
-    """Build the data link of a converter alone in the chamber, and connect it to clock and supply; it warms as it will
-    in the unit (a stated choice).
+    """Build the data link of a converter alone in the chamber, and connect it to clock and supply.
+
+    The converter warms as it will in the unit (a stated choice). Raises `DeviceFault` where the world has no chamber.
     """
     if chamber is None:
         raise DeviceFault("a converter is tested over temperature: its stations must read temperatures")

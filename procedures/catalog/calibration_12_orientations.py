@@ -50,7 +50,7 @@ from procedures.parameters import SupplyParameters
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.site_parameters import TableParameters, declared_table
-from procedures.triad_checks import in_run_limit, triad_checks
+from procedures.triad_checks import RESIDUALS, in_run_limit, triad_checks
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
@@ -211,7 +211,7 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
     """Return the names of the checks and coefficients that a result will have."""
-    checks = (" bias in run, δ/√3", " condition number", OWN_AXES, " residuals, p-value of chi-square")
+    checks = (" bias in run, δ/√3", " condition number", OWN_AXES, f" {RESIDUALS}")
     return tuple(f"{triad}{n}" for triad in TRIAD_NAMES for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 
 
@@ -219,12 +219,12 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
     """Return the planned checks of the error per axis δ/√3, in sample."""
     params = resolve(params, context)
     level, source = params.limits.residual_p_value_min, params.limits.source_of("residual_p_value_min", SIGNIFICANCE)
-    name, limit = "residuals, p-value of chi-square", Limit("1", minimum=level, source=source)
+    limit = Limit("1", minimum=level, source=source)
     found: list[PlannedCheck] = []
     for triad in TRIAD_NAMES:
         plan, in_run = _plan(triad, params, context), in_run_limit(triad, params.limits)
         found.append(in_run_check(plan, in_run.maximum, in_sample_covariance(plan), source=in_run.source))
-    return (*found, *(PlannedCheck(f"{triad} {name}", limit, level=level) for triad in TRIAD_NAMES))
+    return (*found, *(PlannedCheck(f"{triad} {RESIDUALS}", limit, level=level) for triad in TRIAD_NAMES))
 
 
 def report(result: Result) -> Report:

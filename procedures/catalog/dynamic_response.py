@@ -29,9 +29,10 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import ASKED, SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import ASKED, SIGNIFICANCE, Check, Limit, PlannedCheck, check, verdict
 from procedures.core.recording import AXES, GYRO, Recording, Station
 from procedures.core.report import Report
+from procedures.parameters import level_check
 from procedures.procedure import (
     Context,
     JudgedParameters,
@@ -263,8 +264,7 @@ def _checks(found: DynamicResponse, limits: Limits) -> tuple[Check, ...]:
                 sd_hz = c.bandwidth_standard_uncertainty_hz
                 made.append(check(BANDWIDTH.format(axis), c.bandwidth_hz, limit, sd_hz))
         if c.p_value is not None:
-            name, source = RESIDUALS.format(axis), limits.source_of("residual_p_value_min", SIGNIFICANCE)
-            made.append(significance(name, c.p_value, limits.residual_p_value_min, source=source))
+            made.append(level_check(limits, "residual_p_value_min", RESIDUALS.format(axis), c.p_value))
     if limits.stamp_scatter_ms is not None:
         made.append(check(SCATTER, 1e3 * found.stamp_scatter_s, _limit("ms", limits.stamp_scatter_ms)))
     return tuple(made)

@@ -36,6 +36,7 @@ from procedures.multi_position import predicted
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.site_parameters import TableParameters, declared_table
 from procedures.table_motion import default_ramp_s, require_possible, require_rest, rest_with_demands
+from procedures.triad_checks import RESIDUALS
 
 
 class Params(TableParameters):
@@ -130,7 +131,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
     """Return the names of the checks and coefficients that a result will have."""
     scale = tuple(f"gyro scale factor {axis}, 3σ" for axis in AXES)
-    residuals = tuple(f"{triad} {ferraris.RESIDUALS}" for triad in ("gyro", "accelerometer"))
+    residuals = tuple(f"{triad} {RESIDUALS}" for triad in ("gyro", "accelerometer"))
     named = tuple(f"{triad}.{name}" for triad in ("gyro", "accelerometer") for name in COEFFICIENT_NAMES)
     return (*scale, "accelerometer condition number", f"accelerometer{OWN_AXES}", *residuals, *named)
 

@@ -35,11 +35,11 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import SIGNIFICANCE, Check, PlannedCheck, check, significance, verdict
+from procedures.core.limits import Check, PlannedCheck, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
-from procedures.parameters import largest, planned_tests
+from procedures.parameters import largest, level_check, planned_tests
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 from procedures.reports import repeated_alignment as pictures
 from procedures.site_parameters import TableParameters, declared_table
@@ -223,9 +223,8 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
 
 def _checks(angles: Sequence[AngleErrors], limits: Limits) -> tuple[Check, ...]:
     found = [check(HEADING, angles[0].expected_sd_deg, largest(limits, "heading_sd_max_deg", "deg"))]
-    level, source = limits.prediction_p_value_min, limits.source_of("prediction_p_value_min", SIGNIFICANCE)
     found += [
-        significance(f"{a.angle} {AS_PREDICTED}", a.p_value, level, source=source)
+        level_check(limits, "prediction_p_value_min", f"{a.angle} {AS_PREDICTED}", a.p_value)
         for a in angles
         if a.p_value is not None
     ]

@@ -25,11 +25,11 @@ from procedures.core import units
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.site import Site
-from procedures.parameters import largest, planned_tests
+from procedures.parameters import largest, level_check, planned_tests
 from procedures.procedure import (
     Context,
     JudgedParameters,
@@ -258,9 +258,9 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
 
 def _named(term: Term, limits: Limits) -> tuple[str, Limit]:
     """Name of a term in its check, and its limit."""
-    name, field = ("asymmetry",) * 2 if term == "asymmetry" else (f"nonlinearity, {term}", "nonlinearity")
-    most = f"{field}_ppm"
-    return name, largest(limits, most, "ppm", TERM_SOURCE)
+    if term == "asymmetry":
+        return "asymmetry", largest(limits, "asymmetry_ppm", "ppm", TERM_SOURCE)
+    return f"nonlinearity, {term}", largest(limits, "nonlinearity_ppm", "ppm", TERM_SOURCE)
 
 
 def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
@@ -275,8 +275,7 @@ def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
             c = found.coefficient(f"{term}_{axis}")
             checks.append(check(f"gyro {name} {axis}", abs(c.estimate) / ppm, limit, c.standard_uncertainty / ppm))
     if found.p_value is not None:
-        level, source = limits.residual_p_value_min, limits.source_of("residual_p_value_min", SIGNIFICANCE)
-        checks.append(significance(RESIDUALS, found.p_value, level, source=source))
+        checks.append(level_check(limits, "residual_p_value_min", RESIDUALS, found.p_value))
     return tuple(checks)
 
 

@@ -22,6 +22,7 @@ from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.unit_correction import UnitCorrection
+from procedures.parameters import largest
 from procedures.procedure import (
     STATIONS,
     Context,
@@ -204,8 +205,7 @@ LINE, PATH = "is a straight line, p-value", "up against down, p-value"
 def _checks(found: Calibrated, limits: Limits) -> list[Check]:
     checks: list[Check] = []
     for s in found.sensors:
-        offset = Limit("degC", maximum=limits.offset_c, source=limits.source_of("offset_c"))
-        slope = Limit("1", maximum=limits.slope, source=limits.source_of("slope"))
+        offset, slope = largest(limits, "offset_c", "degC"), largest(limits, "slope", "1")
         checks.append(check(f"{s.channel} offset", abs(s.offset_c), offset, s.offset_sd_c))
         checks.append(check(f"{s.channel} slope", abs(s.slope), slope, s.slope_sd))
     # Bonferroni: several sensors, and several pairs, one chance.

@@ -42,12 +42,12 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import SIGNIFICANCE, Check, Limit, PlannedCheck, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.dwells import DwellParameters, expected_stations, saved_tables
-from procedures.parameters import SupplyParameters
+from procedures.parameters import SupplyParameters, level_check
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.reports import diagnosis as diagnoses
@@ -188,7 +188,7 @@ def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]
     params = resolve(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     level = params.limits.prediction_p_value_min
-    limit = Limit("1", minimum=level, source=_level_source(params.limits))
+    limit = Limit("1", minimum=level, source=params.limits.source_of("prediction_p_value_min", SIGNIFICANCE))
     name = "errors as predicted, p-value of chi-square"
     found = [_in_run(p, params.limits) for p in plans]
     return (*found, *(PlannedCheck(f"{triad} {name}", limit, level=level) for triad in TRIAD_NAMES))
@@ -274,17 +274,13 @@ def _in_run(plan: TriadPlan, limits: Limits) -> PlannedCheck:
     return requirements.in_run_check(plan, given.maximum, covariance, of_plan, given.source)
 
 
-def _level_source(limits: Limits) -> str:
-    return limits.source_of("prediction_p_value_min", SIGNIFICANCE)
-
-
 def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check]:
     m, planned = t.magnitudes, _in_run(plan, limits)
     size = units.DISPLAY[m.unit][1]
     checks = [check(planned.check, m.per_axis / size, planned.limit, m.per_axis_sd / size, "", len(m.after) - 1.0)]
     if t.p_value is not None:
         name = f"{m.triad} errors as predicted, p-value of chi-square"
-        checks.append(significance(name, t.p_value, limits.prediction_p_value_min, source=_level_source(limits)))
+        checks.append(level_check(limits, "prediction_p_value_min", name, t.p_value))
     return checks
 
 

@@ -85,8 +85,8 @@ class Channel:
         if not (LEAST_SCALE <= abs(self.scale) <= GREATEST_SCALE and abs(self.offset) <= GREATEST_SCALE):
             raise ValueError(
                 f"channel {self.name!r}: scale {self.scale!r} and offset {self.offset!r} must be finite, "
-                f"the scale not zero: {LEAST_SCALE:g} … {GREATEST_SCALE:g} or the same negative, the offset within "
-                f"±{GREATEST_SCALE:g}"
+                f"the scale not zero: {LEAST_SCALE:g} … {GREATEST_SCALE:g}, or the same negative where the axis is "
+                f"reversed; the offset within ±{GREATEST_SCALE:g}"
             )
 
     @property

@@ -151,9 +151,9 @@ class ThermalCorrection:
     triad: str
     axes: tuple[AxisCorrection, AxisCorrection, AxisCorrection]
     first_stage: ConverterTriad | None = None
-    """The converter's models that were taken out of the outputs before the fit, and so
-    must be wherever the correction is used; None: it is for outputs as they are. The reference of the whole is
-    then these models' for the converter's own drift, and the axes' for the rest: best the same."""
+    """The converter's models that were taken out of the outputs before the fit, and so must be wherever the correction
+    is used; None: it is for outputs as they are. The reference of the whole is then these models' for the converter's
+    own drift, and the axes' for the rest: best the same."""
     fitted_range: TemperatureRange | None = None
     """Temperature range of the fit; beyond it the correction extrapolates. None: not known (older versions)."""
     thermometers: ThermometerCorrection | None = None
@@ -177,13 +177,18 @@ class ThermalCorrection:
         columns = [a.apply(output_m_s2[:, i], own[:, i], converter_c, dynamic) for i, a in enumerate(self.axes)]
         return np.column_stack(columns)
 
+    def staged(self, output_m_s2: Array, converter_c: Array) -> Array:
+        """Return outputs (n, 3) [m/s²] without the converter's own drift, by its models; without models as they are.
+        `converter_c` (n,) [°C].
+        """
+        stage = self.first_stage
+        return output_m_s2 if stage is None else at_reference(output_m_s2, converter_c, stage)
+
     def at_reference(self, output_m_s2: Array, case_c: Array, converter_c: Array) -> Array:
         """Return what the channels would have shown at the reference temperatures, (n, 3) [m/s²]: ``Ṽ/K0 − B0``.
 
         The converter's own models are taken out first where the fit had them taken out; the form ``switched`` is in its
         static regime. Arguments as of `apply`.
         """
-        stage = self.first_stage
-        staged = output_m_s2 if stage is None else at_reference(output_m_s2, converter_c, stage)
-        felt = self.apply(staged, case_c, converter_c, 0.0)
+        felt = self.apply(self.staged(output_m_s2, converter_c), case_c, converter_c, 0.0)
         return felt / self.scales - np.array([axis.bias_m_s2 for axis in self.axes])

@@ -28,14 +28,15 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significance, verdict
+from procedures.core.limits import Check, check, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
-from procedures.parameters import planned_tests
+from procedures.parameters import largest, level_check, planned_tests
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
+from procedures.triad_checks import RESIDUALS
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 
@@ -233,21 +234,17 @@ def _fit(
     return examined_fit(what, means, noise, known, model, uncertainty)
 
 
-RESIDUALS = "residuals, p-value of chi-square"
-
-
 def _checks(triads: Sequence[FieldTriad], params: Params) -> list[Check]:
-    limit = Limit("1", params.scale_sd_limit, source=params.source_of("scale_sd_limit"))
+    limit = largest(params, "scale_sd_limit", "1")
     greatest = max(triads[0].scale_relative_sd)
     found = [check("accelerometer scale factor, greatest relative standard uncertainty", greatest, limit)]
     for t in triads:
         note = "; ".join(filter(None, (f"worst: {t.worst}", t.suspected)))
         name = t.calibration.triad
         if t.p_value is not None:
-            level, source = params.residual_p_value_min, params.source_of("residual_p_value_min", SIGNIFICANCE)
-            found.append(significance(f"{name} {RESIDUALS}", t.p_value, level, note, source))
+            found.append(level_check(params, "residual_p_value_min", f"{name} {RESIDUALS}", t.p_value, note))
         elif t.misfit is not None:
-            limit = Limit("1", maximum=params.misfit_max, source=params.source_of("misfit_max"))
+            limit = largest(params, "misfit_max", "1")
             found.append(check(f"{name} residuals over what noise and positions allow", t.misfit, limit, note=note))
     return found
 

@@ -26,11 +26,11 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
 from procedures.core.imu_model import TriadCalibration, correct
-from procedures.core.limits import ASKED, SIGNIFICANCE, Check, Limit, check, significance, verdict
+from procedures.core.limits import ASKED, Check, Limit, check, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.parameters import planned_tests
+from procedures.parameters import level_check, planned_tests
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
 
 NAMES = ("gyro", "accelerometer")
@@ -191,17 +191,7 @@ DRIFT = "drift as predicted, p-value of its Mahalanobis distance"
 def _checks(params: Params, track: Track, p_value: float | None, distance: float) -> tuple[Check, ...]:
     made: list[Check] = []
     if p_value is not None:
-        level = params.p_value_min
-        note = f"{distance:.3g} standard deviations"
-        made.append(
-            significance(
-                DRIFT,
-                p_value,
-                level,
-                note,
-                params.source_of("p_value_min", SIGNIFICANCE),
-            )
-        )
+        made.append(level_check(params, "p_value_min", DRIFT, p_value, f"{distance:.3g} standard deviations"))
     if params.drift_max_m is not None:
         limit = Limit("m", maximum=params.drift_max_m, source=ASKED)
         made.append(check("greatest distance from the start", float(track.radial_m.max()), limit))

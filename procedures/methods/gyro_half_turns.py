@@ -18,6 +18,7 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import AXES, GYRO, Recording
 from procedures.core.report import Report, Table
 from procedures.core.unit import Unit
+from procedures.parameters import largest
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 CONFIDENCE = 0.999
@@ -154,7 +155,7 @@ def _channel(c: int, found: HalfTurns, params: Params) -> GyroChannel:
 
 def _checks(rate: float, sd: float, expected: float | None, found: HalfTurns, params: Params) -> tuple[Check, ...]:
     relative = sd / rate if rate > 0.0 else float("inf")
-    limit = Limit("1", params.relative_sd_max, source=params.source_of("relative_sd_max"))
+    limit = largest(params, "relative_sd_max", "1")
     checks = [check("horizontal rate, relative standard uncertainty", relative, limit)]
     if expected is not None:
         reach = found.coverage_factor(CONFIDENCE) * sd

@@ -29,6 +29,7 @@ from procedures.core.recording import ACCELEROMETER, GYRO, RecordingInfo
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.unit import Unit
+from procedures.parameters import largest
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 TRIADS = ("accelerometer", "gyro")
@@ -203,7 +204,7 @@ def _step_warnings(a: AlignedAttitude, params: Params) -> tuple[str, ...]:
 
 
 def _checks(a: AlignedAttitude, params: Params) -> tuple[Check, ...]:
-    limit = Limit("deg", params.heading_sd_max_deg, source=params.source_of("heading_sd_max_deg"))
+    limit = largest(params, "heading_sd_max_deg", "deg")
     found = [check(f"{a.recording}: heading, standard uncertainty", a.heading_sd_deg, limit)]
     kinds = (("|f| − g", "m/s^2"), ("|ω| − Ω", "rad/s"), ("ω upwards − Ω·sin L", "rad/s"))
     for (name, unit), error, sd in zip(kinds, a.magnitude_errors, a.magnitude_sd, strict=True):
@@ -211,7 +212,7 @@ def _checks(a: AlignedAttitude, params: Params) -> tuple[Check, ...]:
         found.append(check(f"{a.recording}: {name}", error, bound, sd))
     if a.step_deg is not None:
         note = "" if a.step_at_s is None else f"at {a.step_at_s:.4g} s, by the {a.step_by}"
-        limit = Limit("deg", maximum=params.step_max_deg, source=params.source_of("step_max_deg"))
+        limit = largest(params, "step_max_deg", "deg")
         found.append(check(f"{a.recording}: step of the attitude meanwhile", a.step_deg, limit, note=note))
     return tuple(found)
 

@@ -8,9 +8,10 @@ from procedures.analysis.repeatability.run_to_run import Scatter, run_to_run
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, asked_limit, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
+from procedures.parameters import largest
 from procedures.procedure import Evidence, JudgedParameters, Method, Outcome, Planned
 
 TRIADS = ("gyro", "accelerometer")
@@ -107,17 +108,13 @@ def _show(s: Scatter, value: float) -> str:
 
 def _limit(s: Scatter, params: Params) -> Limit | None:
     """Limit in a display unit; None for a bias in counts, and where none was given."""
-    maximum = None if s.unit == "count" else _maximum(s.triad, s.name.startswith("bias"), params)
-    return None if maximum is None else _limit_of(s.triad, s.name.startswith("bias"), maximum, _display(s)[0])
+    return None if s.unit == "count" else _limit_of(s.triad, s.name.startswith("bias"), params, _display(s)[0])
 
 
-def _maximum(triad: str, bias: bool, params: Params) -> float | None:
-    return getattr(params, FIELDS[triad, bias])
-
-
-def _limit_of(triad: str, bias: bool, maximum: float, unit: str) -> Limit:
-    """The limit with its source: another value than the thesis's comes from the request."""
-    return asked_limit(unit, maximum, Params.model_fields[FIELDS[triad, bias]].default, SOURCE)
+def _limit_of(triad: str, bias: bool, params: Params, unit: str) -> Limit | None:
+    """The limit with its source, the thesis or the request; None where there is none."""
+    limit = largest(params, FIELDS[triad, bias], unit, SOURCE)
+    return None if limit.maximum is None else limit
 
 
 def _si(s: Scatter, limit: Limit) -> float:
@@ -142,14 +139,15 @@ def planned_checks(params: Params, unit: Unit, planned: Planned) -> tuple[Planne
         names += [(f"scale factor {axis}", f"{triad}.K{k}{k}") for k, axis in enumerate("xyz", start=1)]
         for name, coefficient in names:
             bias = name.startswith("bias")
-            maximum = _maximum(triad, bias, params)
             own = [p for one in planned for p in one if p.name == coefficient]
-            if maximum is None or len(own) < 2:
+            if len(own) < 2:
                 continue
             display, size = units.DISPLAY[own[0].unit] if bias else ("ppm", units.PPM)
+            limit = _limit_of(triad, bias, params, display)
+            if limit is None:
+                continue
             record, u = unit.triad(triad), sqrt(sum(p.standard_uncertainty**2 for p in own) / len(own)) / size
             sd = None if record is None else record.bias_run_to_run_sd if bias else record.scale_factor_run_to_run_sd
-            limit = _limit_of(triad, bias, maximum, display)
             expected = None if sd is None else sd / size
             found.append(PlannedCheck(f"{triad} {name} run to run", limit, u, len(own) - 1.0, expected))
     return tuple(found)

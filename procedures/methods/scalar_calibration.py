@@ -33,12 +33,13 @@ from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import SIGNIFICANCE, Check, Limit, check, significance, verdict
+from procedures.core.limits import Check, check, verdict
 from procedures.core.recording import TRIADS, Recording, rates, require_finite
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.parameters import planned_tests
+from procedures.parameters import largest, level_check, planned_tests
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, Parameters, RecordedParameters
+from procedures.triad_checks import RESIDUALS
 
 TURNED = replace(STATIONS.settings, at_rest=False, beside_others=False)
 """One recording of a unit that is turned by hand from pose to pose."""
@@ -227,28 +228,19 @@ def _result(fit: ScalarFit, params: Params, poses: Poses) -> Result:
     )
 
 
-RESIDUALS = "residuals, p-value of chi-square"
-
-
 def _checks(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[Check, ...]:
     relative = _relative_sd(fit, params)
     checks = [
-        check(
-            "condition number",
-            fit.condition,
-            Limit("1", maximum=params.condition_max, source=params.source_of("condition_max")),
-        ),
+        check("condition number", fit.condition, largest(params, "condition_max", "1")),
         check(
             "greatest relative standard uncertainty of a parameter",
             float(relative.max()),
-            Limit("1", maximum=params.uncertainty_max, source=params.source_of("uncertainty_max")),
+            largest(params, "uncertainty_max", "1"),
             note=f"{PARAMETERS[int(np.argmax(relative))]}; beyond the limit it is practically undetermined",
         ),
     ]
     if fit.p_value is not None:
-        note = f"worst: {misfit.worst}"
-        level, source = params.residual_p_value_min, params.source_of("residual_p_value_min", SIGNIFICANCE)
-        checks.append(significance(RESIDUALS, fit.p_value, level, note, source))
+        checks.append(level_check(params, "residual_p_value_min", RESIDUALS, fit.p_value, f"worst: {misfit.worst}"))
     elif not fit.noise_known:
         checks += misfit.checks(
             "residuals over the scatter within the poses", params.misfit_max, params.source_of("misfit_max")

@@ -127,8 +127,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     applied = known is not None and any(known.has(sensor) for sensor in sensors.values())
     series = [_series(recording, sensors, params, known) for recording in recordings]
     found = [_channel(recordings[0].info, name, sensors[name], [s[name] for s in series], params) for name in names]
-    source = params.source_of("level", "ours: no dependence on temperature")
-    level = params.level / len(names)
+    level, source = params.level / len(names), params.source_of("level", "ours: no dependence on temperature")
     checks = tuple(significance(f"{c.channel} {INDEPENDENCE}", c.p_value, level, source=source) for c, _ in found)
     temperatures = [s.departure_c + params.reference_c for _, series in found for s in series]
     return Result(

@@ -24,12 +24,13 @@ from procedures.core.arrays import Array
 from procedures.core.converter import at_reference
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.frames import upward_axis
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, check, verdict
 from procedures.core.recording import ACCELEROMETER, AXES, Recording
 from procedures.core.report import Report, Table
 from procedures.core.thermal_correction import COEFFICIENTS, Form, ThermalCorrection
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
+from procedures.parameters import largest
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 from procedures.reports.thermal_tables import OF_COEFFICIENT
 from procedures.thermal_parameters import Regime
@@ -259,8 +260,7 @@ def _check(one: AxisResult, params: Params) -> Check:
     at_rest = one.static_sd_m_s2 is not None
     value = one.static_sd_m_s2 if one.static_sd_m_s2 is not None else one.dynamic_sd_m_s2 or 0.0
     note = "in sample" if at_rest else "in sample, on ramps: the temperature never stood still"
-    source = params.source_of("three_sigma_m_s2", "thesis 4.3")
-    limit = Limit("m/s^2", maximum=params.three_sigma_m_s2, source=source)
+    limit = largest(params, "three_sigma_m_s2", "m/s^2", "thesis 4.3")
     return check(f"{one.axis} after correction, 3σ", 3.0 * value, limit, note=note)
 
 

@@ -13,6 +13,7 @@ from procedures.analysis.calibration.scalar import (
     scalar_parameters,
     start_from_data,
 )
+from procedures.analysis.least_squares.ellipsoid import ellipsoid
 from procedures.core.errors import Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.table_angles import TableAngles
@@ -23,6 +24,22 @@ ANGLES = [orientation_beta_gamma(b, g) for b, g in BETA_GAMMA]
 VECTORS = reference_vectors("accelerometer", ANGLES, SITE)
 MEANS = B_ACCELEROMETER + VECTORS @ K_ACCELEROMETER.T
 TRUTH = scalar_parameters(np.column_stack([B_ACCELEROMETER, K_ACCELEROMETER]).ravel())
+
+
+def test_the_ellipsoid_through_points_of_one_is_that_one() -> None:
+    """Twelve directions on |R·(u − c)| = 1; rounding of the squares of numbers of 1e4, and no more."""
+    centre = np.array([300.0, -2000.0, 9000.0])
+    upper = np.array([[1.0, 0.03, -0.02], [0.0, 1.1, 0.04], [0.0, 0.0, 0.9]]) / 16_000.0
+    directions = VECTORS / np.linalg.norm(VECTORS, axis=1)[:, None]
+    about_zero = np.linalg.solve(upper, directions.T).T
+    found = ellipsoid(about_zero + centre)
+    assert found is not None
+    np.testing.assert_allclose(found[0], centre, rtol=1e-9)
+    np.testing.assert_allclose(found[1], upper, rtol=0.0, atol=1e-9 / 16_000.0)
+    assert ellipsoid(about_zero + 5.0 * centre) is None, "the origin is outside"
+    x, y, z = directions.T
+    assert ellipsoid(np.column_stack([x, y, np.sqrt(1.0 + x * x + y * y) * np.sign(z + 0.5)])) is None, "two sheets"
+    assert ellipsoid(np.zeros((9, 3))) is None
 
 
 def white(sd: float, n: int = 12) -> np.ndarray:

@@ -149,18 +149,18 @@ def test_the_library_refuses_what_is_no_such_file_and_warns_of_one_that_is_not_f
         inertial.load_calibration(str(alone))
     with pytest.raises(BadParameter, match="what the file has: gyro"):
         inertial.load_calibration(str(alone), "accelerometer")
-    for content in (
-        "",
-        "[]",
-        "{}",
-        '{"format": "imucal", "version": 1}',
-        '{"format": "bench-calibration", "version": 1, "unit": "U-1", "triads": []}',
-        alone.read_text().replace('"calibration": ', '"calibrated": '),
-        alone.read_text().replace('"unusable": ', '"usable": '),
-        both.read_text().replace('"b": [', '"b": [1,'),
+    for content, words in (
+        ("", "cannot be read"),
+        ("[]", "cannot be read"),
+        ("{}", "has no field 'format'"),
+        ('{"format": "imucal", "version": 1}', "cannot be read: format 'imucal', version 1"),
+        ('{"format": "bench-calibration", "version": 1, "unit": "U-1", "triads": []}', "has no triad"),
+        (alone.read_text().replace('"calibration": ', '"calibrated": '), "has no field 'calibration'"),
+        (alone.read_text().replace('"unusable": ', '"usable": '), "has no field 'unusable'"),
+        (both.read_text().replace('"b": [', '"b": [1,'), "cannot be read"),
     ):
         other.write_text(content)
-        with pytest.raises(BadParameter, match="exported with format=json"):
+        with pytest.raises(BadParameter, match=f"exported with format=json; this one {words}"):
             inertial.load_calibration(str(other))
     with pytest.raises(BadParameter, match="cannot be read"):
         inertial.load_calibration(str(tmp_path / "none.json"))

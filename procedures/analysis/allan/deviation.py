@@ -156,9 +156,8 @@ def deviation(
     Where the fast sums would lose accuracy (`correlated.Uncorrelatable`: more than a hundred-thousandth by rounding, a
     two-thousandth by periodic signals), it is differenced term by term.
 
-    `sizes`: cluster sizes [samples]; None: the thesis's, evenly in their logarithm. Raises as `DeviationStream`.
-
-    `increments` as in `DeviationStream`.
+    `sizes`: cluster sizes [samples]; None: the thesis's, evenly in their logarithm. `increments` and
+    errors as in `DeviationStream`.
     """
     for correlate in (True, False):
         stream = DeviationStream(

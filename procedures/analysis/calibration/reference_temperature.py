@@ -23,7 +23,6 @@ from procedures.analysis.cells import cell_means
 from procedures.analysis.thermal.gyro_temperatures import GYRO_SENSORS, gyro_temperatures
 from procedures.analysis.thermal.regime import RegimeSettings
 from procedures.core.arrays import Array
-from procedures.core.converter import at_reference
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import Recording
@@ -195,8 +194,7 @@ def bring_to_reference(
     ]
     spreads = (found.mean_sd_c[:, :-1], found.mean_sd_c[:, -1:])
     of_sensors = np.sum([(d * sd) ** 2 for d, sd in zip(by_sensor, spreads, strict=True)], axis=0)
-    stage = correction.first_stage
-    first = means.outputs if stage is None else at_reference(means.outputs, converter, stage)
+    first = correction.staged(means.outputs, converter)
     own = [case if case.ndim == 1 else case[:, i] for i in range(3)]
     of_correction = [_of_correction(axis, first[:, i], own[i], converter) for i, axis in enumerate(correction.axes)]
     references = correction.axes[0].case_reference_c, correction.axes[0].converter_reference_c

@@ -25,6 +25,8 @@ CHANCE = 1e-10
 RAILS = frozenset((2**15 - 1, -(2**15), 2**16 - 1, 2**23 - 1, -(2**23), 2**24 - 1, 2**31 - 1, -(2**31)))
 """Ends of the range of converters of 16, 24 and 32 bits, signed and unsigned."""
 FAR = 3.0
+"""Ratio of the outermost level's distance from the next one to the span of all further levels, from which on it is no
+part of the signal's range."""
 ROUNDING = 1e-9
 """Difference of two levels relative to the largest value, below which they are one."""
 FEW = 64
@@ -64,7 +66,9 @@ class Edge:
 
     @property
     def is_far(self) -> bool:
-        """True if the outermost level is farther from the next one than that from all others kept."""
+        """True if the outermost level stands apart: farther from the next one than `FAR` times the span of the others
+        that are kept.
+        """
         levels = list(self.levels)
         return len(levels) > NEIGHBOURS and abs(levels[1] - levels[0]) > FAR * abs(levels[-1] - levels[1])
 
@@ -105,7 +109,9 @@ class Edge:
         return bool(min(steep, alone) < CHANCE)
 
     def _apart(self, size: float) -> list[int]:
-        """Numbers of samples by level, levels that only rounding parts as one: pulses times their weight."""
+        """Number of samples at each level; levels that differ by rounding alone, as pulses times their weight do, are
+        counted as one.
+        """
         levels, counts = list(self.levels), list(self.levels.values())
         parted = [abs(a - b) > ROUNDING * size for a, b in pairwise(levels)]
         if all(parted):

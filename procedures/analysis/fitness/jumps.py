@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.analysis.fitness.pieces import MARGIN, Piece, Samples, largest
 from procedures.core.arrays import Array
+from procedures.core.recording import RawArray
 
 SIGMAS = 12.0
 """Standard deviations that no noise of a unit reaches."""
@@ -37,6 +39,21 @@ class Jump:
     """Raw: from the mean of its two neighbours, or the height."""
     noise: float
     """Raw standard deviation that it was judged against."""
+
+    @property
+    def start(self) -> int:
+        """Index of the sample."""
+        return self.index
+
+    @property
+    def stop(self) -> int:
+        """Index after the sample."""
+        return self.index + 1
+
+    def mended(self, _indices: NDArray[np.int64], values: RawArray) -> Array:
+        """Return the outlying sample, (1,), moved to the mean of its neighbours, whole where `values` are."""
+        size = round(self.size) if np.issubdtype(values.dtype, np.integer) else self.size
+        return values.astype(np.float64) - size
 
 
 class Jumps:

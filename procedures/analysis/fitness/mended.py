@@ -1,5 +1,6 @@
-"""Recordings without outliers: each is the mean of its two neighbours; misread temperatures are a straight line."""
+"""Recordings without outliers and misread temperatures: other values stand in their places."""
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ from procedures.analysis.parts import of_channels
 from procedures.core.recording import RawArray, Recording, RecordingInfo
 
 Outliers = Mapping[int, Sequence[Jump | Misread]]
-"""Outliers and misread temperatures, by the column of their channel."""
+"""Outliers and misread temperatures by the column of their channel, one after another."""
 
 
 @dataclass(frozen=True)
@@ -41,21 +42,12 @@ class Mended:
 
     def _mended(self, block: RawArray, start: int) -> RawArray:
         stop = start + len(block)
-        inside = [
-            (c, one)
-            for c, found in self.outliers.items()
-            for one in found
-            if (start <= one.index < stop if isinstance(one, Jump) else one.start < stop and start < one.stop)
-        ]
-        if not inside:
-            return block
-        mended = block.copy()
-        whole = np.issubdtype(mended.dtype, np.integer)
-        for column, one in inside:
-            if isinstance(one, Jump):
-                mended[one.index - start, column] -= round(one.size) if whole else one.size
-                continue
-            rows = np.arange(max(one.start, start), min(one.stop, stop))
-            line = one.straight(rows.astype(np.float64))
-            mended[rows - start, column] = np.rint(line) if whole else line
-        return mended
+        mended: RawArray | None = None
+        for column, found in self.outliers.items():
+            first = bisect_right(found, start, key=lambda one: one.stop)
+            after = bisect_left(found, stop, key=lambda one: one.start)
+            for one in found[first:after]:
+                mended = block.copy() if mended is None else mended
+                rows = np.arange(max(one.start, start), min(one.stop, stop))
+                mended[rows - start, column] = one.mended(rows, block[rows - start, column])
+        return block if mended is None else mended

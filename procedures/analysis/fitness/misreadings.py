@@ -9,25 +9,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.analysis.fitness.findings import Finding, Kind, Severity
 from procedures.analysis.fitness.pieces import Piece, Samples
 from procedures.analysis.fitness.plausibility import COLDEST_C, HOTTEST_C
 from procedures.analysis.fitness.wording import Wording
-from procedures.core.recording import Channel
+from procedures.core.arrays import Array
+from procedures.core.recording import Channel, RawArray
 
 JUMP_K, SLEW_K_S, SLOWEST_S = 5.0, 1.0, 10.0
-"""Least jump: this much and what the fastest thermometer changes by from sample to sample, at most so many seconds."""
+"""Least jump: `JUMP_K`, and the change of the fastest thermometer, `SLEW_K_S`, from one sample to the next or within
+`SLOWEST_S`, whichever is shorter."""
 SIGMAS = 12.0
-"""Least jump in medians of the distance of two samples, for a sensor with much noise."""
+"""Least jump of a noisy sensor, in medians of the distances between neighbouring samples."""
 LONGEST_S = 60.0
-"""Longest run of such readings, unless they are no possible temperatures at all."""
+"""Longest run of such readings, where each is a possible temperature."""
 POWER_ON_C = 85.0
-"""Value of a sensor that was reset; where samples are far apart only it and impossible temperatures count."""
+"""Reading of a sensor that was reset. Where samples are more than `SLOWEST_S` apart, only it and impossible
+temperatures count."""
 MOST_SHARE = 0.2
-"""Greatest share of such readings that the others stand in for."""
+"""Greatest share of such readings in a channel that is used without them."""
 KEPT = 20_000
-"""Most runs that are kept for a channel; with more the channel has no readings to stand in."""
+"""Most runs that are kept for a channel; one with more is not used without them."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +47,12 @@ class Misread:
     value: float
     """First reading of the run [raw]."""
 
-    def straight(self, indices: Samples) -> Samples:
-        """Return the straight line between the readings on either side, at samples of these numbers."""
-        return self.before + (self.after - self.before) * (indices - self.start + 1) / (self.stop - self.start + 1)
+    def mended(self, indices: NDArray[np.int64], values: RawArray) -> Array:
+        """Return, for the samples at some indices (n,) of the run, the straight line between the readings on either
+        side, in whole numbers where `values` (n,) are.
+        """
+        line = self.before + (self.after - self.before) * (indices - self.start + 1.0) / (self.stop - self.start + 1)
+        return np.rint(line) if np.issubdtype(values.dtype, np.integer) else line
 
 
 class Misreadings:
@@ -99,7 +106,8 @@ class _Thermometer:
         self.channel = channel
         self.runs: list[Misread] = []
         self.count = 0
-        self.lost = False
+        self._is_full = False
+        """True: runs were found that are not kept."""
         self._step_s = 1.0 / rate_hz
         self._longest = max(1, round(LONGEST_S * rate_hz))
         self._seen = 0
@@ -113,7 +121,7 @@ class _Thermometer:
     @property
     def few(self) -> bool:
         """True if the other readings can stand in."""
-        return not self.lost and self.count <= MOST_SHARE * self._seen
+        return not self._is_full and self.count <= MOST_SHARE * self._seen
 
     def add(self, x: Samples, d: Samples, start: int) -> None:
         """Take in new samples (n,) from index `start`, and their distances from the ones before, (n,) or (n − 1,)."""
@@ -171,7 +179,7 @@ class _Thermometer:
         if len(self.runs) < KEPT:
             self.runs.append(run)
         else:
-            self.lost = True
+            self._is_full = True
 
     def _is_code(self, value: float) -> bool:
         """Return whether a value is a known code: at an end of a recording one jump alone proves nothing."""

@@ -14,9 +14,11 @@ MOST_CHANGES, SAMPLES_OF_CHANGE = 5, 200
 """Most changes of a channel that gives no signal, and fewest samples for each of them: fewer samples of a coarse
 channel may well be as quiet."""
 SAME_RATIO = 1e-5
+"""Departure of the ratio of two channels from ±1 below which it counts as ±1."""
 WITHOUT_GAPS = (
     "; ways out: a stretch without them (start_s and stop_s), or an Allan deviation that leaves gaps out (gaps)"
 )
+"""Ways out for a channel with some missing values."""
 LEAST_LEVELS = 24
 """Fewest outermost levels whose counts show a repetition: by chance all are even once in 2^24."""
 GREATEST_VALUE, LEAST_SPREAD = 1e18, 1e-24
@@ -76,8 +78,10 @@ def constant(
     return [Finding(Kind.CONSTANT, severity, told, 0, words.seen)]
 
 
-def beyond_reason(channel: Channel, low: float, high: float, words: Wording) -> list[Finding]:
-    """Return the finding on values that no unit makes something of: squares of them overflow, or vanish."""
+def impossible_values(channel: Channel, low: float, high: float, words: Wording) -> list[Finding]:
+    """Return the finding on values too large, or too little varied, for a sensor in any unit: squares of them overflow
+    or vanish. `low`, `high`: least and greatest value [raw].
+    """
     size = abs(gain_of(channel, words.rate_hz))
     most, spread = max(abs(low), abs(high)) * size, (high * 0.5 - low * 0.5) * size * 2.0
     if most <= GREATEST_VALUE and spread >= LEAST_SPREAD:
@@ -85,14 +89,14 @@ def beyond_reason(channel: Channel, low: float, high: float, words: Wording) -> 
     value = f"reads up to {most:.3g}" if most > GREATEST_VALUE else f"varies by {spread:.3g}"
     told = (
         f"channel {channel.name} {value} {channel.rate_unit} where {LEAST_SPREAD:g} … {GREATEST_VALUE:g} is the widest "
-        "range of any sensor: its unit or its scale is wrong"
+        "range of any sensor: its unit or its scale is wrong; import it anew with the right one"
     )
     return [Finding(Kind.WRONG_UNIT, Severity.REFUSE, told, 0, words.seen)]
 
 
 def repeats_itself(edges: Sequence[tuple[Edge, Edge]], words: Wording, settings: FitnessSettings) -> list[Finding]:
-    """Return the finding on a recording that holds itself more than once: each of its outermost levels then occurs
-    once, twice, … as often as in one part. `edges` of the channels that are samples of sensors.
+    """Return the finding on a recording that consists of the same part several times: the number of samples at each of
+    its outermost levels then is a multiple of the number of parts. `edges`: of the channels of sensors.
     """
     counts = [count for pair in edges for edge in pair for count in edge.levels.values()]
     times = gcd(*counts) if len(counts) >= LEAST_LEVELS else 1
@@ -156,17 +160,19 @@ def saturated(name: str, edges: tuple[Edge, Edge], is_integer: bool, repeats: in
         value, count = edge.extreme, edge.count
         word = "largest" if edge.sign > 0 else "smallest"
         begin = f"channel {name}: {words.share(count)} {'stand' if count > 1 else 'stands'} at {value:.9g}, "
-        end = f"; saturated, first at sample {words.at(edge.first_index)}"
+        first = f", first at sample {words.at(edge.first_index)}"
         if is_integer and value in RAILS:
             severity = Severity.REFUSE if count > 1 else Severity.WARN
             found.append(
-                Finding(Kind.SATURATED, severity, f"{begin}the end of its range{end}", edge.first_index, count)
+                Finding(
+                    Kind.SATURATED, severity, f"{begin}the end of its range; saturated{first}", edge.first_index, count
+                )
             )
         elif edge.piles_up(repeats, words.seen, other):
             told = f"{begin}the {word}, and no more than {edge.near} at any of the next three values"
-            zeros = "zeros seem to stand for lost samples, which NaN marks; or "
-            end = end.replace("; ", f"; {zeros}", 1) if value == 0.0 and edge.is_far else end
-            found.append(Finding(Kind.SATURATED, Severity.REFUSE, f"{told}{end}", edge.first_index, count))
+            lost = value == 0.0 and edge.is_far
+            zeros = "; zeros seem to stand for lost samples, which NaN marks; or saturated" if lost else "; saturated"
+            found.append(Finding(Kind.SATURATED, Severity.REFUSE, f"{told}{zeros}{first}", edge.first_index, count))
     return found
 
 

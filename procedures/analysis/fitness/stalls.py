@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from procedures.analysis.fitness.pieces import Mask
 from procedures.core.arrays import Array
+from procedures.core.recording import TRIADS, Channel
 
 SHORTEST = 5
 """Fewest consecutive repeats of a run."""
@@ -58,6 +59,15 @@ class Group:
     """Number of runs beyond those that are kept."""
     open: int = 0
     """Repeats at the end of the previous piece, which a run may continue."""
+
+
+def groups_of(channels: Sequence[Channel]) -> list[tuple[int, ...]]:
+    """Return the columns of the groups that may stand still: all channels, each whole triad, each channel alone."""
+    names = [c.name for c in channels]
+    triads = [tuple(names.index(n) for n in triad) for triad in TRIADS.values() if all(n in names for n in triad)]
+    everything = tuple(range(len(channels)))
+    larger = [everything, *(t for t in triads if len(t) < len(everything))] if len(channels) > 1 else []
+    return [*larger, *((c,) for c in everything)]
 
 
 class Stalls:

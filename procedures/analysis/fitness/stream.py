@@ -18,17 +18,18 @@ from procedures.analysis.fitness.misreadings import Misread, Misreadings
 from procedures.analysis.fitness.pieces import Mask, Piece, Pieces, Samples
 from procedures.analysis.fitness.plausibility import Readings, unlikely_rate
 from procedures.analysis.fitness.repeats import Repeats
-from procedures.analysis.fitness.stalls import Stalls
+from procedures.analysis.fitness.stalls import Stalls, groups_of
 from procedures.analysis.fitness.twins import Twins
 from procedures.analysis.fitness.wording import Wording
 from procedures.analysis.fitness.wraps import Wraps
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
-from procedures.core.recording import AROUND, INCREMENTS, TRIADS, Channel, RawArray, Recording
+from procedures.core.recording import AROUND, INCREMENTS, Channel, RawArray, Recording
 
 _SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT, Kind.EVEN_STEPS)
 
 _FALSIFIES = (Kind.WRAPPED, Kind.CONSTANT, Kind.EVEN_STEPS, Kind.WRONG_UNIT)
+"""Findings after which the readings of a channel say nothing more of its unit or rate."""
 
 FEW_SHARE = 1e-3
 """Greatest share of outliers for which a result without them still represents the channel."""
@@ -56,7 +57,7 @@ class FitnessStream:
         self._edges = [(Edge(+1), Edge(-1)) for _ in range(number)]
         self._bits = [Bits() for _ in range(number)]
         self._repeats = Repeats(number)
-        self._stalls = Stalls(_groups(self._channels), number)
+        self._stalls = Stalls(groups_of(self._channels), number)
         self._copies = Copies(number)
         self._twins = Twins(self._channels)
         self._counters = Counters()
@@ -89,7 +90,7 @@ class FitnessStream:
         found = [self._of_values(c, channel, words) for c, channel in enumerate(self._channels)]
         if words.seen >= max(self._settings.least_samples, 2):
             self._of_repeats(found, words)
-            self._of_pretenders(found, words)
+            self._of_foreign_values(found, words)
             self._of_readings(found, words)
             if self._settings.at_rest:
                 self._of_course(found, words)
@@ -176,11 +177,11 @@ class FitnessStream:
             return found + raw_flaws.constant(channel, edges[0].extreme, self._is_integer, words, settings)
         if words.seen < settings.least_samples or lost == words.seen:
             return found
-        beyond = raw_flaws.beyond_reason(channel, edges[1].extreme, edges[0].extreme, words)
-        if beyond:
-            return beyond
-        changes = self._repeats.pairs - int(self._repeats.zeros[c]) if not lost else words.seen
-        if raw_flaws.is_dead(channel, changes, words.seen, self._is_integer, settings):
+        impossible = raw_flaws.impossible_values(channel, edges[1].extreme, edges[0].extreme, words)
+        if impossible:
+            return impossible
+        changes = self._repeats.pairs - int(self._repeats.zeros[c])
+        if not lost and raw_flaws.is_dead(channel, changes, words.seen, self._is_integer, settings):
             values = edges[1].extreme, edges[0].extreme
             return found + raw_flaws.dead(channel, values, changes, self._first_change[c], words)
         wrap = self._wraps.found(c, edges[1].extreme, edges[0].extreme)
@@ -232,8 +233,10 @@ class FitnessStream:
             for c in together:
                 found[c].append(finding)
 
-    def _of_pretenders(self, found: list[list[Finding]], words: Wording) -> None:
-        """Add findings on channels that hold no sensor's own values: another's, or a time where the unit rests."""
+    def _of_foreign_values(self, found: list[list[Finding]], words: Wording) -> None:
+        """Add findings on values that are not a sensor's own: another channel's, those of an earlier part of the
+        recording, a counter's.
+        """
         for twin in self._twins.found():
             channel, of = self._channels[twin.column], self._channels[twin.of]
             found[twin.column].append(raw_flaws.twin(channel, of, twin.ratio, words))
@@ -242,8 +245,8 @@ class FitnessStream:
             for flaw in raw_flaws.repeats_itself([self._edges[c] for c in own], words, self._settings):
                 for c in own:
                     found[c].append(flaw)
-        for c, step in self._counters.found().items() if self._settings.at_rest else ():
-            if self._channels[c].quantity not in AROUND:
+        for c, step in self._counters.found().items():
+            if self._settings.at_rest and self._channels[c].quantity not in AROUND:
                 found[c] = [raw_flaws.grows_evenly(self._channels[c], step, words)]
 
     def _of_readings(self, found: list[list[Finding]], words: Wording) -> None:
@@ -272,24 +275,15 @@ class FitnessStream:
             refused = any(f.kind is Kind.SATURATED and f.severity is Severity.REFUSE for f in found[c])
             if refused or any(f.kind in _SPOILS_NOISE for f in found[c]):
                 continue
+            if any(f.kind is Kind.MISREAD for f in found[c]):
+                continue
             jumps = self._jumps
             count = int(jumps.outlier_count[c])
             mended = self._settings.mends_outliers and self._few(c)
-            if any(f.kind is Kind.MISREAD for f in found[c]):
-                continue
             found[c] += time_flaws.outliers(channel, jumps.outliers[c], count, mended, words)
             if channel.quantity not in AROUND:
                 found[c] += time_flaws.steps(channel, jumps.steps[c], level[c], cells.size, words)
                 found[c] += time_flaws.noise_changes(channel, noise[c], cells.size * cells.group, words)
-
-
-def _groups(channels: Sequence[Channel]) -> list[tuple[int, ...]]:
-    """All channels, each whole triad, each channel alone."""
-    names = [c.name for c in channels]
-    triads = [tuple(names.index(n) for n in triad) for triad in TRIADS.values() if all(n in names for n in triad)]
-    everything = tuple(range(len(channels)))
-    larger = [everything, *(t for t in triads if len(t) < len(everything))] if len(channels) > 1 else []
-    return [*larger, *((c,) for c in everything)]
 
 
 def inspect(recording: Recording, settings: FitnessSettings | None = None) -> tuple[ChannelFitness, ...]:

@@ -17,7 +17,7 @@ EXACT, EXACT_COUNTS = 1e-4, 1e-12
 """Greatest departure of a difference from the ratio, relative to the largest: numbers are printed with few digits,
 while counts have all of theirs."""
 LOOK = 256
-"""Differences of a piece that are compared first: they part nearly all pairs."""
+"""Number of first differences of a piece that are enough to rule out nearly all pairs."""
 LEAST_CHANGES, LEAST_SIZES = 20, 5
 """Fewest changes of a pair, and fewest different sizes of them, that are no coincidence of a few counts."""
 
@@ -68,7 +68,7 @@ class Twins:
         return list(first.values())
 
     def _part(self, rows: dict[int, Array], exact: float) -> None:
-        """Drop the pairs whose differences are not in one ratio; a channel that does not move tells nothing alone."""
+        """Drop the pairs whose differences are not in one ratio; a channel at rest agrees with one at rest."""
         for pair, known in list(self._ratio.items()):
             one, other = rows[pair[0]], rows[pair[1]]
             at = int(np.argmax(np.abs(one)))

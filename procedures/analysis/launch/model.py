@@ -17,7 +17,7 @@ from procedures.analysis.noise_fit.estimate import PROCESSES, NoiseFit
 from procedures.analysis.noise_fit.followed import Candidate, likeliest_shift
 from procedures.analysis.noise_fit.likelihood import fit_noise
 from procedures.analysis.noise_fit.powers import Powers, slow_powers
-from procedures.analysis.noise_fit.undescribed import Hidden
+from procedures.analysis.noise_fit.undescribed import NOTHING, Hidden
 from procedures.core.arrays import Array
 from procedures.core.units import DEVIATION_DISPLAY, NOISE_DISPLAY
 
@@ -137,14 +137,14 @@ def found_noise(
     return FoundNoise(fit, sentence, temperature, shift, density_of(slow, powers, settings.confidence))
 
 
-def _hidden(coarse: Coarse | None, duration_s: float) -> Hidden | None:
+def _hidden(coarse: Coarse | None, duration_s: float) -> Hidden:
     """Return the limits of what a channel's steps hide: white noise, and slow changes of less than a step.
 
     A flicker stays within half a step on either side; a random walk of duration T leaves a step q from its middle
     with 95 % probability if ``K√T > 0.81·q``, since it stays with ``(4/π)·exp(−π²K²T/2q²)``; a ramp does if R·T > q.
     """
     if coarse is None:
-        return None
+        return NOTHING
     if coarse.step is None:
         return Hidden({QUANTIZATION: 0.0, RANDOM_WALK: 0.0})
     least = {QUANTIZATION: 0.0, RANDOM_WALK: coarse.most_walk}

@@ -9,7 +9,7 @@ def ellipsoid(points: Array) -> tuple[Array, Array] | None:
     """Return centre c (3,) and upper triangular R (3, 3) of ``|R·(u − c)| = 1`` through points (n, 3), n ≥ 9.
 
     Solves ``uᵀQu + qᵀu = 1`` for Q and q; with c = −Q⁻¹q/2 then ``RᵀR = Q/(1 + cᵀQc)``. None where Q is not positive
-    definite: the points lie on no ellipsoid about the origin's side of their wall.
+    definite: the points lie on no ellipsoid, or on one that does not enclose the origin.
     """
     unit = float(np.abs(points).max())
     if unit == 0.0:

@@ -35,6 +35,7 @@ GAIN_OF_TIME, GAIN_OF_CORNER = 16.0, 11.0
 _RATIO = 2.0**0.5
 """Ratio of two successive trial times."""
 _ALIASES = 8
+"""Aliases on either side that count in the power of sampled means."""
 _NO_CORNER, _LEAST_CORNER, _LEAST_TIME = 1e-4, 0.06, 2.0
 """Shortest corner and correlation time that are tried, in samples: a shorter corner looks like none at all."""
 _NEARBY = 1.4
@@ -157,32 +158,30 @@ def fast_extension(joined: Joined, plain: State) -> tuple[Extension, State] | No
     """
     if not np.any(joined.is_fast):
         return None
-    tried: dict[float, tuple[float, Extension, State]] = {}
+    tried: dict[Extension, State] = {}
 
-    def fit(one: Extension) -> float:
-        key = one.time_s or -(one.corner_s or 0.0)
-        if key not in tried:
+    def gain_of(one: Extension) -> float:
+        if one not in tried:
             extended = one.applied(joined).used
-            state = maximum(extended, range(extended.columns.shape[1]))
-            tried[key] = 2.0 * (state.log_likelihood - plain.log_likelihood), one, state
-        return tried[key][0]
+            tried[one] = maximum(extended, range(extended.columns.shape[1]))
+        return 2.0 * (tried[one].log_likelihood - plain.log_likelihood)
 
-    best = max(_fast_candidates(joined), key=fit)
+    best = max(_fast_candidates(joined), key=gain_of)
     step = log(_RATIO)
     while best.corner_s != 0.0:
-        other = max((best.scaled(exp(sign * step)) for sign in (-1.0, 1.0)), key=fit)
-        if fit(other) > fit(best):
+        other = max((best.scaled(exp(sign * step)) for sign in (-1.0, 1.0)), key=gain_of)
+        if gain_of(other) > gain_of(best):
             best = other
         elif best.time_s is None or step < _FINEST:
             break
         else:
             step /= 3.0
-    gain, _, state = tried[best.time_s or -(best.corner_s or 0.0)]
+    gain, state = gain_of(best), tried[best]
     if best.time_s is None:
         return (best, state) if gain > GAIN_OF_CORNER else None
     if gain < GAIN_OF_TIME or not _has_white(best.applied(joined), state):
         return None
-    bend = (fit(best.scaled(exp(-step))) - 2.0 * gain + fit(best.scaled(exp(step)))) / step**2
+    bend = (gain_of(best.scaled(exp(-step))) - 2.0 * gain + gain_of(best.scaled(exp(step)))) / step**2
     return replace(best, spread=sqrt(-2.0 / bend) if bend < 0.0 else 0.0), state
 
 
@@ -207,8 +206,10 @@ def _has_white(joined: Joined, state: State) -> bool:
 
 
 def nearby(model: Extension | None, joined: Joined) -> list[Extension]:
-    """Return models like a fast extension, which its uncertainty allows for; for others a flicker that goes on, where
-    the highest bins are not fitted.
+    """Return models that the record may have instead of the one that was found.
+
+    Of a fast process: times within its uncertainty. Of a flicker with a short corner: all short corners. Otherwise a
+    flicker that goes on, where the highest bins are not fitted.
     """
     if model is not None and model.time_s is not None and model.spread > 0.0:
         return [model.scaled(exp(sign * _NEARBY * model.spread)) for sign in (-1.0, 0.0, 1.0)]

@@ -44,7 +44,7 @@ def fit_noise(
     level: float = 0.01,
     confidence: float = 0.95,
     candidates: Sequence[Candidate] = (),
-    hidden: Hidden | None = None,
+    hidden: Hidden = NOTHING,
 ) -> NoiseFit:
     """Estimate Q, N, B, K, R of one channel from its slow powers and, where given, its fast powers.
 
@@ -67,8 +67,8 @@ def fit_noise(
     joined, model = agreement.joined, agreement.model
     selection = select(joined.used, level)
     estimates, doubt = _estimates(agreement, selection, confidence)
-    left = undescribed(agreement, hidden or NOTHING)
-    estimates = limited(agreement, estimates, left, hidden or NOTHING)
+    left = undescribed(agreement, hidden)
+    estimates = limited(agreement, estimates, left, hidden)
     process = None if model is None else gauss_markov(agreement.plain, model, selection.free)
     fastest = float(np.min(joined.period_s))
     if model and process and like_a_filter(process, fastest) and estimates[RANDOM_WALK].described:

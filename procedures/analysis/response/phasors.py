@@ -22,6 +22,8 @@ TIED = 1.85
 a little less of sixteen.
 """
 WORST_CONDITION = 1e6
+LEAST_READINGS = 5
+"""Least number of the encoder's readings in half a recording, for a drift: the fit has four terms."""
 NOISIEST = 0.1
 """Largest relative standard deviation of a response that is used: beyond it phases are no longer normal."""
 
@@ -67,10 +69,6 @@ def density(noise: NoiseCoefficients, frequency_hz: float, rate_hz: float) -> fl
     f = frequency_hz
     slow = noise.bias_instability**2 / (pi * f) + noise.rate_random_walk**2 / (2.0 * pi**2 * f**2)
     return 2.0 * noise.random_walk**2 + slow + 8.0 * noise.quantization**2 * rate_hz * np.sin(pi * f / rate_hz) ** 2
-
-
-LEAST_READINGS = 5
-"""Least number of the encoder's readings in half a recording, for a drift: the fit has four terms."""
 
 
 def response(samples: Samples, frequency_hz: float, noise: NoiseCoefficients | None) -> Response:
