@@ -34,7 +34,10 @@ def test_a_calibration_goes_out_with_the_other_triads(client: Client) -> None:
     both = json.loads(export(client, gyro, "json", other=accelerometer["id"]))
     assert [t["triad"] for t in both["triads"]] == ["gyro", "accelerometer"]
     assert np.allclose(np.array(both["triads"][1]["inverse"]["A"]) @ both["triads"][1]["forward"]["K"], np.eye(3))
-    assert accelerometer["id"] in export(client, gyro, "openvins", other=accelerometer["id"])
+    assert accelerometer["id"] in export(client, gyro, "matlab", other=accelerometer["id"])
+    unseen = client.http.get(f"{PATH}/{gyro['id']}/export", params={"format": "openvins", "other": accelerometer["id"]})
+    assert unseen.status_code == 422  # the default unit's accelerometers show no random walk (thesis table 4.2)
+    assert "that of the accelerometers is 0; declare a bound" in unseen.json()["detail"]
 
 
 def test_a_current_calibration_is_added_and_a_rejected_one_is_not(client: Client) -> None:
