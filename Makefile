@@ -49,7 +49,7 @@ screenshots: $(VENV)/.browser  ## take the pictures of the pages in docs/picture
 figures: $(VENV)/.browser  ## measure the pages in Chromium: stop, first paint, live charts over MINUTES (20), the feed
 	@$(BIN)/python -m tests.browser.figures --minutes $(or $(MINUTES),20)
 
-chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way; WIRES=1: faults and kills on a bench of drivers instead
+chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; suspend a supervisor; press stop while something is in its way; WIRES=1: faults and kills on a bench of drivers instead
 	@kept=0; $(if $(WIRES), \
 	$(BIN)/python -m tests.soak.wires --minutes $(or $(MINUTES),15) --kill-s 90 || kept=1; $(BIN)/python -m tests.chaos.kills_over_wires || kept=1, \
 	$(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.silent_supervisor || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1); exit $$kept

@@ -5,8 +5,8 @@
 # Version: witmotion 0.0.1.dev0 (Python 3.11). The bytes are those of the maker's protocol: 0x55 0x50, year less 2000,
 # month, day, hour, minute, second, milliseconds (two bytes, low one first), sum of all.
 # Behaviour: the year counts from 1970, and month and day are taken for numbers that begin at 0. The time of day and
-# the differences within a month are right. A record of December, or of the last day of a long month, raises
-# ValueError. And one g is 9.8 m/s^2 in it, 0.07 % less than the standard gravity.
+# the differences within a month are right. A record of December, or of a day whose next one the following month lacks
+# (30 March would be 31 April), raises ValueError. And one g is 9.8 m/s^2 in it, 0.07 % less than the standard gravity.
 # Output seen:
 #   sent 2024-05-17 10:20:30.250, read 1994-06-18 10:20:30.250
 #   sent 2024-12-02, read: ValueError

@@ -9,7 +9,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Lock, Thread
 
+import pytest
 import sqlalchemy as sa
+
+from bench_service.persistence.database import TCP
 
 
 class Port:
@@ -76,6 +79,17 @@ def _close(end: socket.socket) -> None:
     with suppress(OSError):  # closed by the other side
         end.shutdown(socket.SHUT_RDWR)
     end.close()
+
+
+@contextmanager
+def connections_that_wait() -> Generator[None]:
+    """Engines that are made meanwhile wait for a server that hangs, not ten seconds for each new connection.
+
+    So what waits for the database is told from what does not, on a busy machine too.
+    """
+    with pytest.MonkeyPatch.context() as changed:
+        changed.setitem(TCP, "connect_timeout", 300)
+        yield
 
 
 @contextmanager

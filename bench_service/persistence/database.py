@@ -36,8 +36,9 @@ TCP = {
     "keepalives_count": 3,
     "tcp_user_timeout": 10_000,
 }
-"""A server that cannot be reached any more is given up after ten seconds [s, user timeout in ms]; over a Unix socket
-nothing of it applies. One that is reached and hangs is waited for: who must not wait asks in a thread of its own."""
+"""A server that cannot be reached any more, or that leaves a new connection without an answer, is given up after ten
+seconds [s, user timeout in ms]; over a Unix socket `connect_timeout` alone applies. One that hangs once a connection
+stands is waited for: who must not wait asks in a thread of its own."""
 
 _NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})

@@ -84,6 +84,13 @@ def test_the_page_of_settings_has_every_setting_and_no_other() -> None:
     assert named == set(Settings.variables())
 
 
+def test_no_entry_of_the_changelog_stands_twice() -> None:
+    """Branches are merged by keeping the lines of both: a line that one of them moved comes back."""
+    lines = (ROOT / "docs" / "changelog.md").read_text(encoding="utf-8").splitlines()
+    entries = [line for line in lines if line.startswith("- ")]
+    assert sorted({entry for entry in entries if entries.count(entry) > 1}) == []
+
+
 @pytest.mark.parametrize("block", [b for page in PAGES for b in blocks(page)], ids=str)
 def test_every_block_is_run_or_says_why_not(block: Block) -> None:
     """A block has a mark before it: `<!-- run: FILE -->`, `<!-- checked: FILE -->` or `<!-- not run: REASON -->`."""

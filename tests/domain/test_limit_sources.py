@@ -13,14 +13,14 @@ from procedures.core.limits import ASKED, PlannedCheck
 from procedures.core.recording import TRIADS
 from procedures.core.unit import Unit
 from procedures.procedure import Context, Procedure
+from tests.kit.exported_calibrations import UNITS
 
 NOMINAL = np.eye(3, 4, 1).ravel()
 
 
 def calibrated(unit: Unit) -> Unit:
     """The unit with a nominal calibration of both triads, as a verification needs it."""
-    of = {"gyro": "rad/s", "accelerometer": "m/s^2"}
-    found = tuple(triad_calibration(t, of[t], of[t], NOMINAL, 1e-16 * np.eye(12)) for t in TRIADS)
+    found = tuple(triad_calibration(t, UNITS[t], UNITS[t], NOMINAL, 1e-16 * np.eye(12)) for t in TRIADS)
     return Unit(**{**vars(unit), "calibrations": found})
 
 

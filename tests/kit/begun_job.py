@@ -17,6 +17,7 @@ from bench_service.model.job import Job
 from bench_service.model.request import JobRequest
 from bench_service.service import BenchService
 from bench_service.wall_clock import now
+from tests.kit.supervised_bench import Watch
 from tests.service.client import FAST
 
 
@@ -49,16 +50,6 @@ class IdleDispatcher:
     def shut_down(self) -> None: ...
 
 
-class NoWatch:
-    """A host on which nobody says who drives the bench."""
-
-    def driving(self) -> None: ...
-
-    def supervisor(self) -> None: ...
-
-    def silent_supervisor(self) -> None: ...
-
-
 def planner_of(stores: Stores, driver: SimulatedDriver) -> Planner:
     benches = BenchDirectory(stores.benches, stores.units, driver, "sim", drawn_unit, lambda _: "this process")
     return Planner(stores.units, benches, Catalogue())
@@ -77,7 +68,7 @@ class FoundSafe:
 
 def safety_of(stores: Stores, driver: SimulatedDriver) -> SafetyService:
     devices = FoundSafe(driver) if driver._register is None else driver
-    return SafetyService(stores.benches, lambda _: devices, lambda _: NoWatch(), stores.jobs.note)
+    return SafetyService(stores.benches, lambda _: devices, lambda _: Watch(None), stores.jobs.note)
 
 
 def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], bool]) -> tuple[JobRunner, Job]:

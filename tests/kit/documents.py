@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from tests.kit.source_facts import facts
+from tests.kit.source_facts import ROOT, facts
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / "README.md", ROOT / "client" / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 PACKAGES = ("procedures", "simulators", "bench_service")
 _MARK = re.compile(r"<!-- (run|checked|not run): ((?:(?!-->).)+) -->\s*\Z")

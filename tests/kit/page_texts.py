@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Iterable
-from pathlib import Path
 
 from jinja2 import Environment
 
-PRODUCT = Path(__file__).parents[2]
-PAGES = PRODUCT / "bench_service" / "pages"
+from tests.kit.source_facts import ROOT
+
+PAGES = ROOT / "bench_service" / "pages"
 _STRING = r'"((?:[^"\\]|\\.)*)"'
 _CALL = re.compile(rf"\bt\(\s*{_STRING}")
 _NAMES = re.compile(r"\.\.\.\[((?:\s*\"[^\"]*\",?)+)\]\.map\(\(name\) => h\(\"th\", \{\}, t\(name\)\)\)")
@@ -38,7 +38,7 @@ def in_product(texts: Iterable[str]) -> set[str]:
     """Those of the texts that stand in the product's sources as a whole string, in any quotes and over any number of
     lines, or within a docstring: titles, descriptions and values that pages translate when they show them.
     """
-    files = (file for package in ("bench_service", "procedures") for file in (PRODUCT / package).rglob("*"))
+    files = (file for package in ("bench_service", "procedures") for file in (ROOT / package).rglob("*"))
     source = "\n".join(file.read_text(encoding="utf-8") for file in files if file.suffix in {".py", ".js", ".html"})
     strings, docstrings = re.sub(r"""["']\s*f?["']""", "", source), re.sub(r"\s+", " ", source)
 

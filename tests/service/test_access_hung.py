@@ -11,7 +11,7 @@ import pytest
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.wall_clock import monotonic_s, pause
 from tests.chaos.databases import OwnPostgres, database
-from tests.database_away import hung
+from tests.database_away import connections_that_wait, hung
 from tests.kit.busy_machine import BUSY_S
 from tests.kit.people import House, house
 
@@ -29,7 +29,7 @@ CROWD = 60
 
 @pytest.fixture(scope="module")
 def postgres(tmp_path_factory: pytest.TempPathFactory) -> Generator[OwnPostgres]:
-    with database("postgres", tmp_path_factory.mktemp("own")) as made:
+    with connections_that_wait(), database("postgres", tmp_path_factory.mktemp("own")) as made:
         assert isinstance(made, OwnPostgres)
         yield made
 

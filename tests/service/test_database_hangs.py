@@ -25,7 +25,7 @@ from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench import Bench
 from tests.chaos.databases import OwnPostgres, database
-from tests.database_away import hung
+from tests.database_away import connections_that_wait, hung
 from tests.kit.abandoned_bench import abandoned
 from tests.kit.begun_job import prepared
 from tests.kit.busy_machine import BUSY_S
@@ -37,7 +37,7 @@ from tests.service.client import Client
 @pytest.fixture(scope="module")
 def postgres(tmp_path_factory: pytest.TempPathFactory) -> Generator[OwnPostgres]:
     """A server that no other test uses, with our tables."""
-    with database("postgres", tmp_path_factory.mktemp("own")) as made:
+    with connections_that_wait(), database("postgres", tmp_path_factory.mktemp("own")) as made:
         assert isinstance(made, OwnPostgres)
         open_stores(made.url)[1].dispose()
         yield made

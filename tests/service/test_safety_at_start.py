@@ -18,6 +18,7 @@ from bench_service.model.records import BenchStop
 from bench_service.wall_clock import monotonic_s
 from tests.kit.abandoned_bench import abandoned
 from tests.kit.busy_machine import BUSY_S
+from tests.kit.supervised_bench import Watch
 
 LEFT = "when the service started, the table moves and the unit is on: "
 
@@ -30,8 +31,7 @@ class Scene:
         self.notes: list[tuple[str, str]] = []
         self.register, self.devices = register, RegisteredDevices(register)
         benches: Any = SimpleNamespace(stop_bench_once=self.stops.append)
-        watch: Any = SimpleNamespace(driving=lambda: driving, supervisor=lambda: None, silent_supervisor=lambda: None)
-        self.safety = SafetyService(benches, lambda _: self.devices, lambda _: watch, self.note)
+        self.safety = SafetyService(benches, lambda _: self.devices, lambda _: Watch(driving), self.note)
 
     def note(self, job: str, kind: str, at: object, said: dict[str, Any]) -> None:
         self.notes.append((job, said["text"]))

@@ -262,7 +262,7 @@ def test_a_mixed_bench_drives_real_devices_and_records_the_simulated_unit_in_rea
     assert abs(rest[1]) < 0.01
 
 
-def test_the_bench_is_made_safe_within_a_second_with_one_device_hung(east: East) -> None:
+def test_the_bench_is_made_safe_but_for_one_device_that_hangs(east: East) -> None:
     bench = _open(east)
 
     async def work() -> None:

@@ -115,7 +115,8 @@ def _densities(subject: CalibrationSubject, form: str) -> dict[str, float]:
         if not white > 0.0:
             allowed = (
                 "a unit whose random walks N are above zero, for Kalibr and OpenVINS take no other: that of the "
-                f"{name}s is 0; declare a bound with PUT /api/v1/units/{subject.unit}, or take format json, pyins or navego"
+                f"{name}s is 0; declare a bound with PUT /api/v1/units/{subject.unit}, or take format json, pyins or "
+                "navego"
             )
             raise BadParameter("format", form, allowed)
         found[f"{key}_noise_density"] = white
