@@ -194,7 +194,11 @@ class AcutrolTurntable(SwingingTable):
             self._require_current(demand)
             await self._link.demand("position", index, wrapped(end[index]) if count.counts else end[index])
         self._require_current(demand)
-        await self._link.mode("position")
+        try:
+            await self._link.mode("position")
+        except DeviceFault:
+            await self._link.require_closed()  # one that opens between two axes refuses the second: said by its name
+            raise
         await self._wait_for_rest(end, longest, demand)
 
     async def _follow(self, turn: Turn, index: int, start: list[float], demand: int) -> None:
