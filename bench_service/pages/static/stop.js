@@ -12,7 +12,18 @@
     output.hidden = false;
   }
 
-  async function watch(form, arrived, id, from) {  // the safety of the bench after a stop that arrived, and its books
+  // The last stop that arrived from this tab: a job's page loads itself anew when the job ends, and its answer must stay.
+  const kept = {
+    save(stop) { try { sessionStorage.setItem("bench.stop", JSON.stringify(stop)); } catch { /* the answer ends with the page */ } },
+    get(bench) {
+      try {
+        const stop = JSON.parse(sessionStorage.getItem("bench.stop"));
+        return stop && stop.bench === bench && Date.now() < stop.from + WATCH_MS ? stop : null;
+      } catch { return null; }
+    },
+  };
+
+  async function watch(form, arrived, id, from, again = false) {  // the safety of the bench after a stop that arrived, and its books
     const texts = form.dataset;
     while (Date.now() < from + WATCH_MS) {
       await new Promise((go) => setTimeout(go, LOOK_MS));
@@ -20,6 +31,7 @@
       try {
         const answer = await fetch(`/api/v1/benches/${encodeURIComponent(texts.bench)}`, { signal: AbortSignal.timeout(3000) });
         const { safety, stops } = await answer.json(), booked = stops.some((stop) => stop.id === id);
+        if (again && !booked && !patient) return;  // released meanwhile: nothing of it is left to say
         const done = safety.safe === true;
         show(form, done ? "safe" : patient ? "asking" : "unsafe", arrived, done || !patient ? safety.explanation : texts.making, !booked && !patient && texts.books);
         if (done && (booked || !patient)) return;
@@ -48,6 +60,7 @@
       }
       const safe = said.safety && said.safety.safe === true, arrived = `${texts.arrived} ${clock()}.`;
       show(form, safe ? "safe" : "asking", arrived, safe ? said.safety.explanation : texts.making);
+      kept.save({ bench: texts.bench, arrived, id: said.stop, from: Date.now() });
       watch(form, arrived, said.stop, Date.now());
     } catch {
       clearTimeout(late);
@@ -59,5 +72,7 @@
 
   for (const form of document.querySelectorAll("form.stop")) {
     form.addEventListener("submit", (event) => { event.preventDefault(); stop(form); });
+    const before = kept.get(form.dataset.bench);
+    if (before) watch(form, before.arrived, before.id, before.from, true);
   }
 })();
