@@ -1,8 +1,8 @@
 """One thread at a time imports what a start leaves for later.
 
 Where two threads import modules of one package that import each other, as those of scipy do, Python lets one of them
-see a module that is not complete, rather than wait for ever; the import then fails: a job that was resumed while the
-service still loaded the filter of the unit's noise had no procedure.
+see a module that is not complete, rather than wait for ever, and its import fails. Without this lock the file of a
+procedure could not be imported while another thread loaded the filter of the unit's noise, and its job failed.
 """
 
 from threading import RLock

@@ -190,7 +190,8 @@ class SimulatedDriver:
         """Return bias and matrix of each triad in the job's launch, at the unit's reference temperature, run-to-run
         changes included.
         """
-        from simulators.world import launch_truth
+        with IMPORTING:
+            from simulators.world import launch_truth
 
         found = launch_truth(self._config(unit, seed))
         units = {"gyro": "rad/s", "accelerometer": "m/s^2"}
@@ -205,7 +206,8 @@ class SimulatedDriver:
         )
 
     def _config(self, unit: str, seed: int) -> "WorldConfig":
-        from simulators.world import WorldConfig
+        with IMPORTING:
+            from simulators.world import WorldConfig
 
         return WorldConfig(
             unit=self._truth_of(unit),
@@ -241,6 +243,7 @@ def _drawn_truth(serial: str) -> UnitTruth | None:
 
 def synthetic_rates(noise: NoiseCoefficients, rate_hz: float, count: int, seed: int) -> Iterator[Array]:
     """Yield blocks of rates of a chosen noise, (n,), for synthetic recordings."""
-    from simulators.imu.synthesis import synthesise
+    with IMPORTING:
+        from simulators.imu.synthesis import synthesise
 
     return synthesise(noise, rate_hz, count, seed)
