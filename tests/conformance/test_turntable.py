@@ -1,12 +1,15 @@
 """Promises of the turntable's port, for every implementation of it."""
 
 import asyncio
+from collections.abc import Sequence
 from math import nan
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bench_service.drivers.devices.table_axes import TurnProgress
+from bench_service.drivers.protocols.acutrol import Mode
 from procedures.bench.errors import BenchError, DeviceBusy, DeviceFault, Disconnected, OutOfRange, Stopped
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
@@ -256,6 +259,26 @@ def test_made_safe_with_the_servo_off_where_the_section_says_so(tmp_path: Path) 
 
     with table("acutrol", tmp_path, on_safe="off") as rig:
         asyncio.run(scene(rig))
+
+
+def test_an_interlock_that_opens_between_the_axes_of_a_move_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The controller refuses the mode of the next axis in its own words; which interlock it was is read then."""
+    with table("acutrol", tmp_path) as rig:
+        port: Any = rig.port
+        served, link = rig.served, port._link
+        assert served is not None
+        mode = link.mode
+
+        async def after_the_demands(wanted: Mode, indices: Sequence[int] = (0, 1, 2)) -> None:
+            if wanted == "position":
+                served.do(lambda bench: bench.table.open_interlock(2))
+            await mode(wanted, indices)
+
+        monkeypatch.setattr(link, "mode", after_the_demands)
+        with pytest.raises(DeviceFault, match="interlock 3 of the turntable is open: find out why"):
+            asyncio.run(rig.port.move_to(TableAngles(0, 0, 300)))
 
 
 def test_an_interlock_that_opens_during_a_move_ends_it(tmp_path: Path) -> None:
