@@ -16,6 +16,9 @@ FRAME = (
     "the IMU frame of this file is Q times the unit's frame of the calibration (R_imu_from_unit): a mounting rotation",
     "of the unit must be multiplied with it, or the unit is turned by its misalignment",
 )
+UNSEEN_S = 3600.0
+"""Averaging time at which the value written for a rate random walk of zero has the Allan deviation of the white
+noise [s]."""
 
 
 def kalibr_noise(subject: CalibrationSubject) -> str:
@@ -24,12 +27,8 @@ def kalibr_noise(subject: CalibrationSubject) -> str:
     """
     subject.require_noise("kalibr-imu")
     lines = commented(subject, "#", *_noise_remarks(subject))
-    return (
-        "\n".join(
-            [*lines, *_noise(subject, "kalibr-imu"), "rostopic: /imu0", f"update_rate: {_number(subject.rate_hz)}"]
-        )
-        + "\n"
-    )
+    lines += [*_noise(subject, "kalibr-imu"), "rostopic: /imu0", f"update_rate: {_number(subject.rate_hz)}"]
+    return "\n".join(lines) + "\n"
 
 
 def kalibr_intrinsics(subject: CalibrationSubject) -> str:
@@ -98,10 +97,6 @@ def _noise_remarks(subject: CalibrationSubject) -> list[str]:
     ]
 
 
-UNSEEN_S = 3600.0
-"""Averaging time at which a rate random walk that was not observed equals the white noise in its stead [s]."""
-
-
 def _densities(subject: CalibrationSubject, form: str) -> dict[str, float]:
     """Fields with densities N [rate/√Hz] and K [rate/s/√Hz]; the bias instability belongs in no field.
 
@@ -114,9 +109,9 @@ def _densities(subject: CalibrationSubject, form: str) -> dict[str, float]:
         white, walk = _of_noisiest(subject, name)
         if not white > 0.0:
             allowed = (
-                "a unit whose random walks N are above zero, for Kalibr and OpenVINS take no other: that of the "
-                f"{name}s is 0; declare a bound with PUT /api/v1/units/{subject.unit}, or take format json, pyins or "
-                "navego"
+                "only for a unit whose random walks N are above zero, because Kalibr and OpenVINS read no other: that "
+                f"of the {name}s is 0; declare a bound with PUT /api/v1/units/{subject.unit}, or take format json, "
+                "pyins or navego"
             )
             raise BadParameter("format", form, allowed)
         found[f"{key}_noise_density"] = white
