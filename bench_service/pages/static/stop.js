@@ -23,19 +23,20 @@
     },
   };
 
-  async function watch(form, arrived, id, from, again = false) {  // the safety of the bench after a stop that arrived, and its books
+  async function watch(form, stop) {  // the safety of the bench after a stop that arrived, and its books
     const texts = form.dataset;
-    while (Date.now() < from + WATCH_MS) {
+    while (Date.now() < stop.from + WATCH_MS) {
       await new Promise((go) => setTimeout(go, LOOK_MS));
-      const patient = Date.now() < from + SAFE_MS;
+      const patient = Date.now() < stop.from + SAFE_MS;
       try {
         const answer = await fetch(`/api/v1/benches/${encodeURIComponent(texts.bench)}`, { signal: AbortSignal.timeout(3000) });
-        const { safety, stops } = await answer.json(), booked = stops.some((stop) => stop.id === id);
-        if (again && !booked && !patient) return;  // released meanwhile: nothing of it is left to say
+        const { safety, stops } = await answer.json(), booked = stops.some((one) => one.id === stop.id);
+        if (stop.again && !booked) { if (stop.booked || !patient) return; continue; }  // released, or not in the books yet
+        if (booked && !stop.booked) kept.save(Object.assign(stop, { booked }));
         const done = safety.safe === true;
-        show(form, done ? "safe" : patient ? "asking" : "unsafe", arrived, done || !patient ? safety.explanation : texts.making, !booked && !patient && texts.books);
+        show(form, done ? "safe" : patient ? "asking" : "unsafe", stop.arrived, done || !patient ? safety.explanation : texts.making, !booked && !patient && texts.books);
         if (done && (booked || !patient)) return;
-      } catch { show(form, "unsafe", arrived, texts.unknown); }
+      } catch { show(form, "unsafe", stop.arrived, texts.unknown); }
     }
   }
 
@@ -60,8 +61,9 @@
       }
       const safe = said.safety && said.safety.safe === true, arrived = `${texts.arrived} ${clock()}.`;
       show(form, safe ? "safe" : "asking", arrived, safe ? said.safety.explanation : texts.making);
-      kept.save({ bench: texts.bench, arrived, id: said.stop, from: Date.now() });
-      watch(form, arrived, said.stop, Date.now());
+      const arrival = { bench: texts.bench, arrived, id: said.stop, from: Date.now(), booked: false };
+      kept.save(arrival);
+      watch(form, arrival);
     } catch {
       clearTimeout(late);
       show(form, "unsafe", texts.silent);
@@ -73,6 +75,6 @@
   for (const form of document.querySelectorAll("form.stop")) {
     form.addEventListener("submit", (event) => { event.preventDefault(); stop(form); });
     const before = kept.get(form.dataset.bench);
-    if (before) watch(form, before.arrived, before.id, before.from, true);
+    if (before) watch(form, { ...before, again: true });
   }
 })();
